@@ -56,7 +56,7 @@ def test_the_demo_is_a_paragraph_that_names_the_truth_once(demo):
     assert "inf" not in printed
     assert "paper" not in printed
     last = printed.rstrip().splitlines()[-2:]
-    assert last == ["open demo/report.html", "to use your own file: deadtime estimate FILE"]
+    assert last == ["open demo/report.html", "To use your own file: deadtime estimate FILE"]
 
 
 def test_all_methods_of_the_demo_are_shown_where_asked_for(all_of_demo):
@@ -132,7 +132,7 @@ def test_a_real_flight_by_both_methods():
     assert high - low > 0.04  # the robust one; the naive one is 0.014 wide
     said = " ".join(out["explanation"])
     assert "differ" in said
-    assert "gain is not 1" in said
+    assert "assumes a gain of 1, but the gain is" in said
     assert (
         "The fit without a further lag is only an indication: the residuals are not white" in said
     )
@@ -185,7 +185,7 @@ def test_a_design(tmp_path):
     )  # fmt: skip
     assert fixed["gains"]["Kp"] == 2.0
     assert fixed["margins"]["gain_margin"] >= 2.25
-    assert "holds the design back" in fixed["traded"]["gain_margin"]
+    assert "limits the design" in fixed["traded"]["gain_margin"]
     assert picture.stat().st_size > 5000
     chosen = found("design", "--delay", 0.36, "--fix", "Kp=2", "--choose-filter")
     assert 100 < chosen["filter"] < 200
@@ -207,7 +207,7 @@ def test_a_simulation_and_its_file(tmp_path):
 @pytest.mark.parametrize("command", ["estimate", "report"])
 @pytest.mark.parametrize(
     ("content", "words"),
-    [(None, "no file"), (b"", "is empty"), (bytes(range(256)) * 4, "neither a text file")],
+    [(None, "does not exist"), (b"", "is empty"), (bytes(range(256)) * 4, "neither a text file")],
 )
 def test_files_that_cannot_be_read(tmp_path, command, content, words):
     file = tmp_path / "flight.csv"
@@ -239,7 +239,7 @@ BAD_NUMBERS = [
     (["design", "--delay", "0.1", "--fix", "2"], "Kp=2"),
     (["design", "--delay", "0.1", "--fix", "Ki=2"], "Ki"),
     (["design", "--delay", "0.1", "--gain-margin", "0.5"], "gain_margin"),
-    (["design", "--delay", "0.1", "--filter", "38", "--choose-filter"], "give only one of them"),
+    (["design", "--delay", "0.1", "--filter", "38", "--choose-filter"], "give only one of the two"),
     (["simulate", "--kp", "2", "--delay", "-1"], "delay"),
     (["simulate", "--kp", "0", "--delay", "1"], "Kp"),
     (["simulate", "--kp", "nan", "--delay", "1"], "nan"),

@@ -81,4 +81,4 @@ def test_poles_and_a_zero_get_names_where_a_plant_has_few(formula, parameters):
 @pytest.mark.parametrize("option", [["--free", "delay"], ["--method", "all"]])
 def test_what_a_choice_does_not_take_is_refused(roll, option):
     result = run("estimate", roll, "--kp", 1, "--plant", "auto/s", *option)
-    assert "fits all numbers of a plant by one method" in one_clear_line(result)
+    assert "one method fits all parameters of the plant" in one_clear_line(result)

@@ -180,7 +180,7 @@ def test_the_delay_comes_first_and_warnings_follow(files):
             first,
         )
         assert re.match(
-            r"No test of the model fails at the 1 % level\. A further lag below "
+            r"The tests of the model find no contradiction at the 1 % level\. A further lag below "
             r"[\d.]+ m?s would not be seen\. quick\.csv, warning: the command stops at 1",
             said,
         ), said
@@ -195,8 +195,10 @@ def test_an_indication_says_why_and_what_to_do(files):
     """A plant with the wrong lag; the advice is in the words of the command line."""
     wrong = ["estimate", files["lagging"], "--kp", 1.2, *FLOWN, *LOGGED]
     said = " ".join(run(*wrong, "--method", "output_error").stdout.split())
-    assert re.match(r"indication: delay about [\d.]+ m?s, not claimed to hold; a further lag", said)
-    assert "makes the recording likelier, so the plant lacks a lag" in said
+    assert re.match(
+        r"indication: delay about [\d.]+ m?s, interval not reliable; with a further lag", said
+    )
+    assert "the recording is more likely, so the plant lacks a lag" in said
     assert "next: try --free delay,gain,lag" in said
     assert "±" not in said
     right = [*wrong, "--method", "output_error", "--free", "delay,gain,lag"]
@@ -205,7 +207,7 @@ def test_an_indication_says_why_and_what_to_do(files):
     assert out["lag"] == pytest.approx(0.2, abs=0.05)
     assert out["noise_model"]["white"] == pytest.approx(0.004, rel=0.3)
     first = run("estimate", files["quick"], "--kp", 2, *FLOWN, "--method", "gcc").stdout
-    assert re.match(r"indication: delay about [\d.]+ ms, not claimed to hold; ", first)
+    assert re.match(r"indication: delay about [\d.]+ ms, interval not reliable; ", first)
 
 
 def test_a_plant_with_a_time_constant_under_pi_control(files):
@@ -278,12 +280,12 @@ def test_a_file_may_have_a_window_of_its_own(files, tmp_path):
     [
         (["--free", "delay,mass"], "'mass' cannot be fitted; choose from delay, gain, lag"),
         (["--free", "delay,Kp"], "'Kp' cannot be fitted"),
-        (["--free", ","], "names nothing to fit: choose from delay, gain, lag"),
-        (["--free", "gain"], "the delay is not known, so add delay to --free"),
+        (["--free", ","], "names no parameter: choose from delay, gain, lag"),
+        (["--free", "gain"], "the delay is not known, so it must be fitted"),
         (["--free", "delay,start"], "start can be fitted only by --method waveform"),
         (
             ["--free", "delay,time_constant"],
-            "this plant has no time_constant; only a plant gain/(time_",
+            "this plant has no time_constant. Only a plant gain/(time_",
         ),
         (["--plant", "1/s**2", "--free", "delay,lag"], "choose from delay, gain"),
         (["--plant", "1/(2*s+1)", "--free", "lag"], "choose from delay, gain, time_constant"),
@@ -303,8 +305,8 @@ def test_what_cannot_be_fitted_is_refused_always(files, more, words):
     [
         (["--kp", 2, "--method", "guess"], "not one of all, auto, output_error"),
         (["--kp", 2, "--kp", 3], "1 file and 2 values of --kp"),
-        (["--kp", 2, "--noise", "loop"], "--noise applies to one method only"),
-        (["--kp", 2, "--initial-output", 0], "--initial-output applies to one method only"),
+        (["--kp", 2, "--noise", "loop"], "--noise works with one method only"),
+        (["--kp", 2, "--initial-output", 0], "--initial-output works with one method only"),
         (
             ["--kp", 2, "--method", "gcc", "--noise", "loop"],
             "--noise is not an option of --method gcc",
@@ -313,10 +315,13 @@ def test_what_cannot_be_fitted_is_refused_always(files, more, words):
             ["--kp", 2, "--method", "output_error", "--map", "exact"],
             "--map is not an option of --method output_error",
         ),
-        (["--kp", 2, "--free", "delay"], "--free applies to one method only"),
-        (["--kp", 2, "--method", "gcc", "--free", "delay,gain"], "gcc does not fit gain, only"),
+        (["--kp", 2, "--free", "delay"], "--free works with one method only"),
+        (
+            ["--kp", 2, "--method", "gcc", "--free", "delay,gain"],
+            "gcc cannot fit gain. It can fit only",
+        ),
         (["--kp", 2, "--filter", 20], "--filter is the filter of the derivative"),
-        (["--kp", 2, "--kv", 0.1, "--ki", 0.1], "give --kv, or the others"),
+        (["--kp", 2, "--kv", 0.1, "--ki", 0.1], "give --kv alone, or leave --kv out"),
         (["--kp", 2, "--kd", 0.1, "--kd", 0.2], "1 file and 2 values of --kd"),
         (["--kp", "nan"], "--kp is nan"),
         (["--kp", 2, "--method", "cta"], "continuous loops"),
@@ -343,7 +348,7 @@ def test_invalid_combinations_of_options_for_several_files(files, more, words):
 
 def test_a_window_that_is_none(files):
     said = one_clear_line(run("estimate", f"{files['quick']}@1:x", "--kp", 2, *FLOWN))
-    assert "'x' is not a time. Write a file with a window as FILE@LOW:HIGH" in said
+    assert "'x' is not a time. To read only a part of a file, write FILE@LOW:HIGH" in said
 
 
 def test_a_reference_equal_to_the_output_is_refused(tmp_path):

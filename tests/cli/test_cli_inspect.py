@@ -47,8 +47,8 @@ def test_one_loop(log):
 
 
 def test_what_is_wrong_is_one_line(log, tmp_path):
-    assert "its loops are roll, pitch" in one_clear_line(run("inspect", log, "--loop", "yaw"))
-    assert "there is no file" in one_clear_line(run("inspect", tmp_path / "no.ulg"))
+    assert "Its loops are roll, pitch" in one_clear_line(run("inspect", log, "--loop", "yaw"))
+    assert "does not exist" in one_clear_line(run("inspect", tmp_path / "no.ulg"))
     text = tmp_path / "flight.csv"
     text.write_text("time,reference\n")
     assert "open it with dtm.read_recording" in one_clear_line(run("inspect", text))
@@ -57,7 +57,7 @@ def test_what_is_wrong_is_one_line(log, tmp_path):
 def test_a_flight_of_a_log_with_one_is_refused(log):
     result = run("inspect", log, "--flight", 2)
     assert result.returncode != 0
-    assert "DataFlash log, which contains one flight only" in one_clear_line(result)
+    assert "DataFlash log, which contains only one flight" in one_clear_line(result)
 
 
 @pytest.mark.parametrize("more", [[], ["--json"]])

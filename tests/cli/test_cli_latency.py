@@ -55,7 +55,7 @@ def test_the_command_prints_the_table_of_the_summary(log):
 def test_a_loop_in_full_and_all_in_full(log):
     result = run("latency", log, "--loop", "roll rate")
     assert "seen in" in result.stdout
-    for words in ("dead time", "cross-correlation: ", "from the fit", "gyro low-pass: 11.25 ms"):
+    for words in ("dead time", "cross-correlation: ", "for the fit", "gyro low-pass: 11.25 ms"):
         assert words in result.stdout, words
     assert "\nloop " not in result.stdout
     everything = run("latency", log, "--verbose").stdout
@@ -145,7 +145,7 @@ def test_a_log_of_an_instant_is_answered_by_one_line(tmp_path):
     assert result.returncode == 3
     assert result.stdout == ""
     assert len(result.stderr.splitlines()) == 1
-    assert "none: flight.bin is 42 ms long" in result.stderr
+    assert "none: flight.bin lasts only 42 ms" in result.stderr
 
 
 def test_a_log_at_rest_has_no_time(tmp_path):

@@ -36,7 +36,7 @@ def test_the_delay_margin_of_the_best_cell():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.PV(**out["best"]), delay=0.36)
     assert out["best_delay_margin"] == loop.margin().delay_margin
     printed = run("map", *SMALL).stdout
-    assert f"its delay margin is {out['best_delay_margin']:.4g} s" in printed
+    assert f"and delay margin {out['best_delay_margin']:.4g} s" in printed
     assert "boundary of" in printed
 
 

@@ -43,7 +43,7 @@ def test_gains_that_were_in_use_bound_the_step(folder):
 def test_a_record_without_a_plant_gives_none(folder):
     done = run("tune", "noise.csv", cwd=folder)
     assert done.returncode == 3
-    assert done.stdout.startswith("none: no gains, because")
+    assert done.stdout.startswith("none: no gains were proposed, because")
 
 
 def test_a_log_gives_the_parameters_of_its_firmware(folder):
@@ -57,20 +57,23 @@ def test_a_log_gives_the_parameters_of_its_firmware(folder):
 
 
 REFUSED = [
-    (["bare.bin", "--loop", "roll rate"], "by controller=, on the command line --controller"),
+    (["bare.bin", "--loop", "roll rate"], "by controller=, or by --controller on the command line"),
     (["flown.bin", "--loop", "altitude"], "has no loop 'altitude'"),
-    (["flown.bin", "--kp", 1], "--kp is only for tables"),
+    (["flown.bin", "--kp", 1], "--kp applies only to tables"),
     (
         ["bump.csv", "--form", "ardupilot"],
-        "--loop is missing: the loops of ardupilot are roll rate",
+        "--loop is missing: give one of the loops of ardupilot, which are roll rate",
     ),
-    (["bump.csv", "--form", "px4", "--loop", "rol"], "--loop rol: the loops of px4 are roll rate"),
+    (
+        ["bump.csv", "--form", "px4", "--loop", "rol"],
+        "--loop rol: give one of the loops of px4, which are roll rate",
+    ),
     (
         ["bump.csv", "--loop", "roll"],
-        "--loop needs the form of a vehicle, and the form parallel is not",
+        "--loop applies only to the form of a vehicle, but parallel is not",
     ),
-    (["bump.csv", "--firmware", "4.5"], "--firmware needs the form of a vehicle"),
-    (["bump.csv", "--filter-hz", 2], "--filter-hz is the filter of a derivative"),
+    (["bump.csv", "--firmware", "4.5"], "--firmware applies only to the form of a vehicle"),
+    (["bump.csv", "--filter-hz", 2], "--filter-hz belongs to a derivative"),
     (["bump.csv", "--controller", "PID", "--form", "px4", "--loop", "altitude"], "no integral"),
 ]
 
@@ -86,4 +89,4 @@ def test_what_makes_no_sense_is_refused(folder, options, why):
 def test_what_refuses_each_loop_of_a_log_names_it_once(folder):
     done = run("tune", "bare.bin", cwd=folder)
     assert done.returncode == 3
-    assert "can be tuned: roll rate: the log has no gain of this loop" in done.stderr
+    assert "roll rate: the log contains no gain of this loop" in done.stderr

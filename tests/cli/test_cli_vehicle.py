@@ -37,9 +37,9 @@ def test_fly_and_watch_take_a_key(tmp_path):
     ):
         done = run(*command, "--key", "key", cwd=tmp_path)
         assert done.returncode == 1
-        assert "holds no signing key" in done.stderr
+        assert "contains no signing key" in done.stderr
     done = run("fly", "--key", "key", cwd=tmp_path)
-    assert "--key signs the messages of a link" in done.stderr
+    assert "--key is the key that signs messages of a link" in done.stderr
     done = run("watch", "table.csv", "--key", "key", cwd=tmp_path)
     assert "is a file" in done.stderr
 

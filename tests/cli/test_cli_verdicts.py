@@ -17,10 +17,16 @@ def printed(line):
     ("line", "words"),
     [
         # Three were promised and one was listed, without a word.
-        ("--kp 2 --kv 0.3 --delay 0.36", "1 root, not 3: all right of Re s = -3.344"),
-        ("--kp 2 --delay 0.36", "6 roots: all right of Re s = -8.79"),
-        ("--kp 2 --delay 0.36 --rightmost 1", "2 roots: all right of"),
-        ("--kp 2 --delay 0", "1 root: all there are, proved"),
+        (
+            "--kp 2 --kv 0.3 --delay 0.36",
+            "1 root instead of the 3 that were asked for. The list is proved to be complete",
+        ),
+        ("--kp 2 --delay 0.36", "6 roots. The list is proved to be complete right of Re s = -8.79"),
+        (
+            "--kp 2 --delay 0.36 --rightmost 1",
+            "2 roots. The list is proved to be complete right of",
+        ),
+        ("--kp 2 --delay 0", "1 root. The list is proved to be complete"),
         ("--kp 6 --delay 0.36 --re -1 -0.5 --im 0 1", "0 roots in re=(-1, -0.5), im=(0, 1)"),
         ("--kp 2 --delay 0.36", "stable: spectral abscissa -1.51536"),
         ("--kp 6 --delay 0.36", "unstable: a root at 0.634054 ± 4.73323j"),
@@ -50,11 +56,11 @@ def test_an_unstable_loop_has_no_steady_state():
 
 def test_a_limit_bounds_the_response_and_not_the_judgement():
     shown = printed("simulate --kp 8 --delay 0.36 --limit 1")
-    assert shown.startswith("the loop (without the limit on its command) is unstable")
+    assert shown.startswith("the loop (the limit of the command is ignored) is unstable")
     assert "steady" not in shown
 
 
 def test_a_stable_loop_that_is_watched_too_short_a_time():
     shown = printed("simulate --kp 2 --delay 0.36 --duration 0.2")
     assert shown.startswith("the loop is stable")
-    assert "settling time not within the time simulated" in shown
+    assert "settling time not within the simulated time" in shown

@@ -62,7 +62,7 @@ def test_a_long_table_has_rows_for_times_alone_and_fifteen_of_them():
 
 
 def test_loops_that_share_a_reason_have_one_line():
-    by = "by moves the log gives {} ms and the fit {} ms"
+    by = "by moves the log gives {} ms, but the fit gives {} ms"
     first = loop("roll", "indication", by.format(71.5, 59))
     second = loop("pitch", "indication", f"{by.format(80, 61)}; and more")
     assert lines_of(first, second) == [f"indication: roll: {first.reason}; likewise pitch"]
@@ -70,14 +70,14 @@ def test_loops_that_share_a_reason_have_one_line():
     both = [replace(actuator, loop="roll"), loop("roll", "none", "it rests", time=NAN), actuator]
     assert lines_of(*both) == ["none: roll; from actuator yaw: it rests"]
     # Of several reasons why time is left out, the one that leaves out most.
-    mode = "the flight mode does not close this loop"
+    mode = "in this flight mode the loop is open"
     why = f"9.3 s are left out: it is on the ground; 188 s are left out: {mode}"
     assert lines_of(loop("yaw", "none", why)) == [f"none: yaw: {mode}"]
 
 
 def test_a_plain_number_that_contradicts_the_fit_has_a_line_of_its_own():
-    few = "too few windows determine the time by themselves: 3, but 8 are needed"
-    by = "by moves the log gives 12 ms and the fit 6 ms"
+    few = "a time needs 8 windows that determine the time alone, but there are only 3"
+    by = "by moves the log gives 12 ms, but the fit gives 6 ms"
     doubted = loop("yaw", "indication", f"{few}; {by}")
     assert lines_of(doubted) == [f"indication: yaw: {few}", f"indication: yaw: {by}"]
 
@@ -96,7 +96,9 @@ def test_lines_are_few_and_fit_a_screen_where_their_parts_do():
     lines = lines_of(*loops, advice=advice)
     assert len(lines) == 5
     assert max(map(len, lines)) <= 100
-    assert lines[0].startswith("roll: the time differs over the log, by 20 ms")
+    assert lines[0].startswith(
+        "roll: the time changes during the log, with a standard deviation of 20 ms"
+    )
     assert lines[3].endswith("; for others: --verbose")
     assert lines[4] == "next: set this"
 
@@ -104,9 +106,9 @@ def test_lines_are_few_and_fit_a_screen_where_their_parts_do():
 def test_a_time_that_depends_on_the_size_of_the_movement_is_said_in_numbers():
     slow = spread(slope=-0.02, interval=(-0.026, -0.014))
     told = lines_of(loop("roll", spread=slow), loop("pitch", spread=spread()))
-    assert told == ["roll takes 13.9 ± 2.1 ms longer where the setpoint moves half as much"]
+    assert told == ["roll takes 13.9 ± 2.1 ms longer if the setpoint moves half as much"]
     fast = spread(slope=0.02, interval=(0.014, 0.026))
-    assert "ms less where" in lines_of(loop("roll", spread=fast))[0]
+    assert "ms less if" in lines_of(loop("roll", spread=fast))[0]
 
 
 def test_zero_has_no_sign():

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
-EXPECTED = r"must have void \(double, double \*, double \*, double \*, double \*, void \*\)"
+EXPECTED = (
+    r"must have the signature void \(double, double \*, double \*, double \*, double \*, void \*\)"
+)
 
 
 def solve(fun, **options):
@@ -108,12 +110,12 @@ CASES = {
     ("bad", "message"),
     [
         # A forgotten return read "[NaN]"; an imaginary part was dropped.
-        (nothing, "None: end it with a return"),
+        (nothing, "returned None"),
         (complex_number, "complex"),
         (lambda *_: np.array([1j]), "complex"),
         (lambda *_: [1.0j], "complex"),
         (lambda *_: [None], "None|object"),
-        (lambda *_: "1.0", "give real numbers"),
+        (lambda *_: "1.0", "(give|return) real numbers"),
     ],
 )
 def test_values_that_are_no_real_numbers_are_refused_by_name(name, bad, message):

@@ -220,7 +220,7 @@ def test_dense_output_and_its_derivative():
     assert sol([[1.0, 2.0]]).shape == (1, 1, 2)
     assert sol(-5.0) == 0.5
     for outside in (-17.1, 100.1, np.nan):
-        with pytest.raises(ValueError, match="known from"):
+        with pytest.raises(ValueError, match="known only from"):
             sol(outside)
     with pytest.raises(ValueError, match="nu=2"):
         sol(1.0, nu=2)

@@ -190,7 +190,7 @@ def test_a_jump_is_found_where_it_is():
 @pytest.mark.parametrize(
     ("function", "message"),
     [
-        (lambda t: abs(t - 0.3), r"not smooth at t = 0.3\d* s: name the time in input_breaks"),
+        (lambda t: abs(t - 0.3), r"not smooth at t = 0.3\d* s: give this time in input_breaks"),
         (lambda t: hash(t) % 1000 / 7.0, "more than 20000 polynomial pieces"),
     ],
 )

@@ -37,13 +37,13 @@ def fitted(seed, moved=None):
 
 @pytest.mark.parametrize("flights", [10, pytest.param(30, marks=NIGHTLY)])
 def test_air_that_is_always_there_is_not_taken_for_more(flights):
-    found = sum("while it rests" in fitted(seed).message for seed in range(flights))
+    found = sum("than at rest" in fitted(seed).message for seed in range(flights))
     assert found <= flights / 15
 
 
 @pytest.mark.parametrize("flights", [2, pytest.param(10, marks=NIGHTLY)])
 def test_air_that_is_there_while_the_vehicle_moves_is_found(flights):
-    found = sum("while it rests" in fitted(seed, 0.1).message for seed in range(flights))
+    found = sum("than at rest" in fitted(seed, 0.1).message for seed in range(flights))
     assert found >= 0.7 * flights
 
 

@@ -61,7 +61,7 @@ def test_an_estimate_under_such_noise_is_reliable_and_its_intervals_hold_the_tru
         for name, truth in (("delay", DELAY), ("gain", GAIN))
     ]
     assert all(np.mean(one) >= 0.85 for one in held)
-    assert "coloured at rest" in reliable[0].message
+    assert "coloured also at rest" in reliable[0].message
 
 
 @pytest.mark.parametrize("plant", [LAGGED, OVERSHOOTING])

@@ -213,7 +213,7 @@ def test_the_significance_of_the_command_has_a_closed_form():
     four = brentq(lambda x: x**half * (1.0 + half * (1.0 - x)) - F_TEST_LEVEL, 1e-6, 1.0)
     for tested, share in ((2, two), (4, four)):
         _check_response(0.999 * none * share, none, freedom, tested)
-        with pytest.raises(dtm.NotIdentifiableError, match="no more than for noise"):
+        with pytest.raises(dtm.NotIdentifiableError, match="as it does for noise"):
             _check_response(1.001 * none * share, none, freedom, tested)
 
 
@@ -237,7 +237,7 @@ def test_no_interval_is_given_and_the_error_names_a_method_that_has_one(method):
 def test_a_command_at_its_limit_throughout_has_no_peak():
     # The correlation of two steps is flat up to the delay, so its first value is not a peak.
     recording, known = record_step(Kp=2.0, limit=0.05, duration=8.0, rest=1.0)
-    with pytest.raises(dtm.NotIdentifiableError, match="at its limit"):
+    with pytest.raises(dtm.NotIdentifiableError, match="because of its limit"):
         dtm.estimate_delay(recording, known, method="gcc")
     fit = dtm.estimate_delay(recording, known, method="output_error")
     assert fit.delay == pytest.approx(0.36, abs=1e-9)

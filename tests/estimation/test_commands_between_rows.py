@@ -96,7 +96,7 @@ def test_what_is_wrong_about_a_hold_is_said(sparse):
         with pytest.raises(ValueError, match="give a time above zero"):
             of(sparse, hold=hold)
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0))
-    with pytest.raises(ValueError, match="hold is for an estimate without a loop"):
+    with pytest.raises(ValueError, match="hold is only for an estimate without a loop"):
         dtm.estimate_delay(sparse, loop, hold=0.01)
 
 

@@ -107,7 +107,7 @@ def test_the_command_of_the_loop_serves_where_none_was_logged():
 
 
 def test_a_name_that_the_plant_does_not_have_is_refused():
-    with pytest.raises(ValueError, match=r"lag_3.*choose from .*lag_2"):
+    with pytest.raises(ValueError, match=r"lag_3.*choose one or more from .*lag_2"):
         dtm.estimate_delay(record_attitude(0, **VEHICLE), KNOWN, free=("delay", "lag_3"))
 
 

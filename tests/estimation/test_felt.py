@@ -86,10 +86,10 @@ def test_a_plant_without_a_largest_gain_says_so(fit):
     slow = replace(fit, loop=loop, free=("gain",), cov=np.array([[1e-6]]))
     assert slow.largest_gain == math.inf
     assert math.isnan(slow.crossover)
-    assert "no proportional gain makes the loop unstable; at " in slow.summary()
+    assert "no proportional gain makes the loop unstable. At " in slow.summary()
     with pytest.raises(ValueError, match="no proportional gain makes the loop unstable"):
         slow.ci(0.95, "largest_gain")
-    with pytest.raises(ValueError, match=r"omega=-1 rad/s: give a frequency above zero"):
+    with pytest.raises(ValueError, match=r"omega=-1 rad/s: give frequencies above zero"):
         fit.at(-1.0)
 
 

@@ -197,7 +197,7 @@ def test_what_cannot_be_estimated_is_refused():
         )
     with pytest.raises(ValueError, match="for an Integrator"):
         estimate(recording, known.replace(plant=dtm.FirstOrder()), ("delay",))
-    with pytest.raises(ValueError, match="choose from"):
+    with pytest.raises(ValueError, match="choose one or more from"):
         estimate(recording, known, ("delay", "offset"))
     uneven = recording.time + 0.02 * np.sin(np.arange(len(recording)))
     with pytest.raises(refused, match="even"):

@@ -148,7 +148,7 @@ def test_a_plan_in_wind_does_not_promise_what_a_calm_one_does():
     )
     assert windy.stderr["delay"] > 4 * calm.stderr["delay"]
     assert windy.stderr["gain"] > 30 * calm.stderr["gain"]
-    assert "air of 0.1 over 0.3 s" in windy.summary()
+    assert "wind (air) of 0.1 with a time constant of 0.3 s" in windy.summary()
     assert windy.bound.noise == windy.noise == NOISES["gusts"][0]
     noisy = dtm.identifiability(loop, step, noise=windy.noise, runs=20)
     # The command that holds the vehicle against the gusts adds a little information.
@@ -207,7 +207,7 @@ def test_noise_without_a_covariance_is_refused():
 @pytest.mark.parametrize(
     ("change", "experiment", "match"),
     [
-        ({}, dtm.Experiment.relay(5.0, 0.5), "switching times of the relay"),
+        ({}, dtm.Experiment.relay(5.0, 0.5), "times at which the relay switches"),
         ({"controller": dtm.PI(1.3, 0.2)}, dtm.Experiment.step(), "integral"),
         ({"controller": dtm.PV(1.3, 0.0)}, dtm.Experiment.step(), "P controller"),
         ({}, dtm.Experiment.step(3001 * TS), "3001 samples.*shorter"),

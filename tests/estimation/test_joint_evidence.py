@@ -86,7 +86,7 @@ def test_lists_that_do_not_match_are_refused():
         dtm.estimate_delay(two, window=[(0, 100)])
     with pytest.raises(ValueError, match="2 recordings and 3 of `controller`"):
         dtm.estimate_delay(two, controller=[dtm.P(1.0)] * 3)
-    with pytest.raises(TypeError, match="recording must be a Recording, got int"):
+    with pytest.raises(TypeError, match="recording must be a Recording, not int"):
         dtm.estimate_delay([two[0], 3])
 
 

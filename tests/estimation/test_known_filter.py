@@ -118,7 +118,7 @@ def test_what_does_not_fit_is_refused():
         OutputError(air="sideways")
     recording = rows(PT1)
     loop = dtm.ControlLoop(dtm.FirstOrder(1.0, 0.1), dtm.P(1.0), sample_time=1.0 / RATE)
-    with pytest.raises(ValueError, match="air='vehicle' needs a plant that integrates"):
+    with pytest.raises(ValueError, match="air='vehicle' needs a plant such as Integrator"):
         dtm.estimate_delay(recording, loop, method=OutputError(air="vehicle"))
     gone = np.delete(np.arange(3000), slice(1000, 1200))
     holed = dtm.Recording(

@@ -195,10 +195,10 @@ def test_what_is_wrong_is_said_with_its_value():
         ({"delays": [0.1, 0.2]}, "2 delays"),
         ({"delays": [0.3, 0.2, 0.1]}, "follows 0.3"),
         ({"white": 0.0}, "white noise of 0"),
-        ({"level": 1.0}, "a level of 1"),
-        ({"layers": [([-0.1], 0.0, [0.0] * 5)]}, "the lag -0.1 s"),
+        ({"level": 1.0}, "the level is 1"),
+        ({"layers": [([-0.1], 0.0, [0.0] * 5)]}, "a lag is -0.1 s"),
         ({"layers": [([0.1], 0.0, [-math.inf] * 5)]}, "all prior weights are zero"),
-        ({"den": (1.0, *[0.0] * 7)}, "the bank takes up to 9"),
+        ({"den": (1.0, *[0.0] * 7)}, "the filters can use at most 9"),
     ):
         with pytest.raises(ValueError, match=words):
             OnlineBank(settings(**changed))

@@ -236,15 +236,15 @@ def refused(**change):
         ({"output": np.full(93, 2.0)}, "output is 2 throughout"),
         ({"window": (0.0, 0.3)}, "at least 8"),
         ({"window": (0.0, 0.55), "free": ("delay", "gain", "lag")}, "too few"),
-        ({"free": ("delay", "offset")}, "choose from"),
-        ({"free": ()}, "at least one"),
+        ({"free": ("delay", "offset")}, "choose one or more from"),
+        ({"free": ()}, "one or more"),
         ({"free": ("gain",)}, "unknown"),
         (
             {
                 "loop": dtm.ControlLoop(dtm.FirstOrder(), dtm.P(1.0)),
                 "free": ("delay", "gain", "lag"),
             },
-            "no lag to fit",
+            "no lag that could be fitted",
         ),
         (
             {"command": None, "loop": dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.0, 0.1))},

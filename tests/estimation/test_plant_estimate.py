@@ -115,7 +115,7 @@ def test_the_summary_begins_with_the_verdict_and_says_what_came_second(fit):
     assert first == fit.headline()
     assert first.startswith("reliable: dead time 1")
     assert "a process that comes to rest, time constant" in first
-    assert any(line.strip().startswith("second: ") for line in rest)
+    assert any(line.strip().startswith("second best: ") for line in rest)
     assert rest[-1].strip() == fit.advice().statement
     statement = fit.advice().statement
     found = eval(statement, {"dtm": dtm, "fit": fit})
@@ -193,7 +193,7 @@ def test_a_known_controller_gives_the_command_and_its_crossover():
     assert fit.delay + fit.best.lags[0] == pytest.approx(0.6, abs=0.06)
     true = vehicle.continuous().margin().gain_crossovers[-1]
     assert fit.crossover_in_loop == pytest.approx(true, rel=0.05)
-    assert "with its controller the loop crosses over at" in fit.summary()
+    assert "with its controller, the loop has its crossover at" in fit.summary()
 
 
 @pytest.mark.parametrize("name", ["2_4_0_25", "0_5_1_0"])
@@ -213,7 +213,7 @@ def test_the_height_servo_is_found_without_being_named(name):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"limit": 1.0}, "limit=1.0 is the limit of a controller"),
+        ({"limit": 1.0}, "limit=1.0 is a limit of the controller"),
         ({"controller": dtm.PI(1.0, 0.1)}, "only for a P controller"),
         ({"plant": "two poles"}, "plant='two poles' is not one of 'delay', 'lag'"),
         ({"largest_delay": 0.0}, "largest_delay"),
@@ -236,11 +236,11 @@ def test_a_recording_without_a_command_and_options_of_the_other_way_are_refused(
     with pytest.raises(dtm.RecordingError, match="no command, so nothing shows"):
         dtm.estimate_delay(dtm.Recording(time, command, output))
     loop = dtm.ControlLoop(dtm.FirstOrder(), dtm.P(1.0))
-    with pytest.raises(ValueError, match="at_rest is for an estimate without a loop"):
+    with pytest.raises(ValueError, match="at_rest is only for an estimate without a loop"):
         dtm.estimate_delay(dtm.Recording(time, command, output, command), loop, at_rest=True)
     with pytest.raises(ValueError, match="no recording was given"):
         dtm.estimate_delay([])
-    with pytest.raises(ValueError, match="omega=-1 rad/s: give a frequency above zero"):
+    with pytest.raises(ValueError, match="omega=-1 rad/s: give frequencies above zero"):
         fit.at([-1.0])
     with pytest.raises(ValueError, match="'zeros' has no interval"):
         fit.ci(0.95, "zeros")
@@ -276,7 +276,7 @@ def test_a_command_that_moves_at_the_beginning_alone_takes_the_plant_at_rest():
     assert said.delay == fit.delay
     unknown = dtm.estimate_delay(record, at_rest=False)
     assert unknown.verdict == "none"
-    assert "before the rows that the fit uses" in unknown.reason
+    assert "before the rows that are fitted" in unknown.reason
     assert "at_rest=True" in unknown.advice().statement
 
 

@@ -40,7 +40,7 @@ def test_intervals_of_rounded_flights_cover_and_their_errors_are_those_of_the_bo
     for seed in range(flights):
         fit = estimated([flight(seed)])
         # In some flights rounding errors are taken for air, and their rows for values.
-        read += "interval of its rounding" in fit.message
+        read += "interval as wide as its rounding" in fit.message
         errors.append(fit.delay - DELAY)
         bounds.append(fit.crb.stderr["delay"])
         held.append(

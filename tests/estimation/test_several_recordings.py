@@ -95,8 +95,8 @@ def test_the_joint_model_consists_of_the_models_of_its_recordings():
         (([], None), ValueError, "no recording"),
         (("two", ["one loop"]), ValueError, "2 recordings and 1 of `loop`"),
         (("two", "loop", [None] * 3), ValueError, "2 recordings and 3 of `window`"),
-        ((["text"], "loop"), TypeError, r"recording\[0\] must be a Recording, got str"),
-        (("two", ["a", "b"]), TypeError, r"loop\[0\] must be a ControlLoop, got str"),
+        ((["text"], "loop"), TypeError, r"recording\[0\] must be a Recording, not str"),
+        (("two", ["a", "b"]), TypeError, r"loop\[0\] must be a ControlLoop, not str"),
         (("two", "plants"), ValueError, "different plants"),
     ],
 )

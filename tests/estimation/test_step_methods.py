@@ -267,7 +267,7 @@ def test_recordings_without_information_are_refused(method):
     for seed in range(10):
         with pytest.raises(dtm.NotIdentifiableError):
             read(noise_for_output(recording, seed))
-    with pytest.raises(dtm.NotIdentifiableError, match="widen"):
+    with pytest.raises(dtm.NotIdentifiableError, match="choose a longer window"):
         read(recording, window=(0.0, 0.6))
     with pytest.raises(ValueError, match="Integrator under P"):
         read(recording, known.replace(plant=dtm.FirstOrder()))

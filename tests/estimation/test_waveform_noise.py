@@ -167,7 +167,7 @@ def test_an_unknown_start_increases_the_error_as_the_bound_says():
 
 def test_a_start_cannot_be_separated_from_the_delay_where_the_command_is_logged():
     recording, known = record_step(0.01)
-    with pytest.raises(ValueError, match="choose from"):
+    with pytest.raises(ValueError, match="choose one or more from"):
         dtm.estimate_delay(recording, known, method="output_error", free=("delay", "start"))
 
 

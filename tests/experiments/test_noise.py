@@ -181,7 +181,7 @@ def test_own_models_are_taken():
         (held_loop(sample_time=None), "continuous controller.*sample_time"),
         (held_loop(dtm.PI(1.0, 0.2)), "integral.*without Ki"),
         (held_loop(dtm.PV(1.0, 0.1, dtm.DerivativeFilter(20.0))), "filter.*discretisation"),
-        (held_loop(dtm.PD(1.0, 0.1)), "no ideal derivative"),
+        (held_loop(dtm.PD(1.0, 0.1)), "ideal derivative of noise does not exist"),
         (
             held_loop(dtm.P(30.0), dtm.RationalPlant([1.0], [1.0, -20.0]), delay=0.0),
             "unstable and grows by",

@@ -115,7 +115,7 @@ def test_limits_weight_and_anti_windup_are_described() -> None:
         loop.replace(controller=dtm.PID(1.0, 0.5, 0.1, derivative_weight=0.5)),
         loop.replace(controller=dtm.PI(1.0, 0.5, feed_forward=0.5)),
     ):
-        with pytest.raises(ValueError, match="the explorer shows no rate limit"):
+        with pytest.raises(ValueError, match="the explorer cannot show a rate limit"):
             other.explore()
     with pytest.raises(ValueError, match="two finite limits"):
         loop.replace(limit=(-1.0, np.inf)).explore()

@@ -63,7 +63,7 @@ def test_the_whole_experiment_in_virtual_time(whole):
     assert json.loads((folder / "result.json").read_text(encoding="utf-8")) == whole_result
     again = run_fly("--virtual-time", "--folder", folder)
     assert again.returncode == 1
-    assert "holds recordings already" in again.stderr
+    assert "contains recordings already" in again.stderr
 
 
 @pytest.mark.survey
@@ -92,16 +92,16 @@ def test_a_real_host_needs_consent_and_shows_the_limits():
     [
         (("--gains", "1.2,3"), "Kp = 3 is above 2.47"),
         (("--gains", "fast"), "numbers with commas"),
-        (("--gains", ""), "no gains to fly"),
-        (("--max-height", "1.2"), "outside 0.2 to 1.2 m"),
-        (("--host", "127.0.0.1", "--virtual-time"), "leave one of the two options out"),
+        (("--gains", ""), "gains is empty"),
+        (("--max-height", "1.2"), "outside of 0.2 to 1.2 m"),
+        (("--host", "127.0.0.1", "--virtual-time"), "leave out --virtual-time"),
         (("--max-climb", "nan"), "max_climb"),
         (("--axes", "z,w"), "give some of z, x, y, yaw"),
-        (("--gains", "x=1"), "the axis x is not among those of --axes"),
-        (("--axes", "x", "--virtual-time"), "takes no speed commands on the axis x, only on z"),
+        (("--gains", "x=1"), "the axis x is not in --axes"),
+        (("--axes", "x", "--virtual-time"), "accepts no speed commands on the axis x, only on z"),
         (("--step", "-0.2"), "step"),
-        (("--step", "1e-5"), "within the noise"),
-        (("--step", "0.95", "--base", "1.5", "--max-height", "4"), "steps of 0.9 m or less"),
+        (("--step", "1e-5"), "as small as the noise"),
+        (("--step", "0.95", "--base", "1.5", "--max-height", "4"), "a step of 0.9 m or less"),
     ],
 )
 def test_unsafe_or_invalid_options_are_refused(options, message, tmp_path):

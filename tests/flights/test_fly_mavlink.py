@@ -91,9 +91,9 @@ def test_another_computer_needs_consent(tmp_path):
 
 def test_one_vehicle_at_a_time_and_in_real_time(tmp_path):
     done = run_command("fly", "--link", "tcp:127.0.0.1:5760", "--host", "192.0.2.1")
-    assert "give only one of them" in done.stderr
+    assert "give only one of the two" in done.stderr
     done = run_command("fly", "--link", "tcp:127.0.0.1:5760", "--virtual-time")
-    assert "leave one of the two options out" in done.stderr
+    assert "leave out --virtual-time" in done.stderr
     done = run_command("fly", "--link", "tcp:127.0.0.1:9", "--folder", tmp_path / "f")
     assert done.returncode == 1
     assert "cannot be opened" in done.stderr

@@ -38,7 +38,7 @@ def test_flights_numbers_and_page_are_in_the_folder(tmp_path):
     )
     assert study.headline().split(".")[0] in found.page.read_text(encoding="utf-8")
     # A second experiment would mix its flights with those of the first.
-    with pytest.raises(ValueError, match="holds recordings already: name another folder"):
+    with pytest.raises(ValueError, match="contains recordings already: give another folder"):
         fly_and_report(flown(vehicle), [PLAN], tmp_path)
 
 

@@ -3,7 +3,7 @@
     python tests/house/messages.py [--over WORDS] [--place TEXT]
 
 A message is a string that is raised or warned of, or a longer one that reads as a sentence; in the
-kernel, the string of a refusal. ``{…}`` stands for a value. With `--over` only messages that have a
+kernel, a string of some words. ``{…}`` stands for a value. With `--over` only messages that have a
 sentence of more words are listed.
 """
 
@@ -18,7 +18,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PYTHON = ROOT / "python/deadtime"
-RUST = (ROOT / "rust/core/src", ROOT / "rust/bindings/src")
+RUST = (ROOT / "rust/core/src", ROOT / "rust/bindings/src", ROOT / "rust/wire/src")
 
 #: Most words of a sentence.
 MOST = 25
@@ -26,12 +26,12 @@ MOST = 25
 #: Fewest words of a string that is read as a sentence where nothing raises it.
 FEWEST = 5
 
-#: Refusals of the kernel, up to their first string.
-REFUSAL = re.compile(
-    r"(?:refuse!|refuse_if!|Error::\w+|argument|new_err|Refusal::\w+|Some|Err)\s*\((?:[^\"();]*,)?"
-    r"\s*(?:format!\(\s*)?\"((?:[^\"\\]|\\.)*)\"",
-    re.DOTALL,
-)
+#: Comments of the kernel, and reasons of its lints.
+NO_MESSAGE = re.compile(r"^[ \t]*//.*$|reason = \"[^\"]*\"|'(?:\\.|[^'\\])'", re.MULTILINE)
+
+#: A string of the kernel.
+STRING = re.compile(r'"((?:[^"\\]|\\.)*)"', re.DOTALL)
+
 #: Strings that are no sentences: code, styles, patterns, formats.
 NO_SENTENCE = re.compile(
     r"[<>\\{}|]{2}|^\s*[.#@/-]|::|=>|^[a-z_]+\(|;\s*$|\bpx\b|^[A-Z]{3}[A-Z_ -]+"
@@ -96,9 +96,10 @@ def of_python(path: Path) -> Iterator[Message]:
 
 
 def of_rust(path: Path) -> Iterator[Message]:
-    """The refusals of a file of the kernel."""
+    """The sentences in a file of the kernel."""
     source = path.read_text(encoding="utf-8").partition("#[cfg(test)]")[0]
-    for found in REFUSAL.finditer(source):
+    source = NO_MESSAGE.sub(lambda found: " " * len(found[0]), source)
+    for found in STRING.finditer(source):
         text = re.sub(r"\\\n\s*", "", found[1])
         if len(text.split()) >= FEWEST:
             line = source.count("\n", 0, found.start()) + 1

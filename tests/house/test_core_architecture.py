@@ -253,8 +253,8 @@ def resolved(module, path):
 def uses(module, path):
     """Modules of the core that a file uses, in `use` lines and in paths within the code."""
     text = code(path)
-    found = [p for tree in re.findall(r"\buse\s+([^;]+);", text) for p in paths_in(tree)]
-    rest = re.sub(r"\buse\s+[^;]+;", "", text)
+    found = [p for tree in re.findall(r"\buse\s+([\w:{},*\s]+);", text) for p in paths_in(tree)]
+    rest = re.sub(r"\buse\s+[\w:{},*\s]+;", "", text)
     found += [tuple(p.split("::")) for p in re.findall(r"\b(?:crate|super)(?:::\w+)+", rest)]
     targets = {resolved(module, names) for names in found}
     return targets - {None, module, ()}

@@ -297,5 +297,5 @@ def test_parts_that_are_no_solution_are_refused():
         (2**60, end, starts, ends, terms, coefficients),
         (0, end, starts, ends, terms, coefficients),
     ):
-        with pytest.raises(ValueError, match="no pieces of a solution"):
+        with pytest.raises(ValueError, match="the pieces of the solution are not valid"):
             kind(*wrong)

@@ -173,8 +173,8 @@ def test_a_replayed_step_applies_the_safe_command_after_the_watchdog():
     [
         ({"gains": ()}, "empty"),
         ({"gains": (-1.0,)}, "above zero"),
-        ({"mode": "dream"}, "not one of"),
-        ({"methods": ["guess"]}, "none of"),
+        ({"mode": "dream"}, "give one of"),
+        ({"methods": ["guess"]}, "do not exist"),
     ],
 )
 def test_invalid_trials_are_refused_with_the_reason(change, words):
@@ -406,10 +406,10 @@ def test_the_command_prints_the_same_for_the_same_seed(tmp_path):
     [
         (["--policy", "jitter-buffer"], "needs a time"),
         (["--loss", "1.5"], "probability"),
-        (["--duration", "1.5"], "leaves less"),
+        (["--duration", "1.5"], "ends less"),
         (["--gain", "0"], "above zero"),
-        (["--plot", "loop.txt", "--gain", "8"], "not the name of a picture"),
-        (["--plot", "there/loop.png", "--gain", "8"], "no folder there"),
+        (["--plot", "loop.txt", "--gain", "8"], "the name of a picture must end"),
+        (["--plot", "there/loop.png", "--gain", "8"], "the folder there does not exist"),
         (["--folder", "a-file", "--gain", "8"], "a-file: File exists"),
     ],
 )

@@ -129,7 +129,7 @@ def test_every_cycle_sends_the_flight_request_and_an_old_setpoint_is_not_repeate
             sent = record_datagrams(drone)
             given = now()
             drone.command(0.5)
-            with pytest.raises(FlightAbortedError, match=r"no command for 1\.0"):
+            with pytest.raises(FlightAbortedError, match=r"no command was given for 1\.0"):
                 await read_states(drone, 0.01, hovering=False)
             assert now() - given == pytest.approx(LIMITS.landing_after, abs=0.05)
             times = [time for time, _ in sent]
@@ -178,10 +178,10 @@ def test_missing_navdata_during_take_off_lands_the_drone(begun):
             await asyncio.sleep(begun)
             drone._link.reader.accept = lambda packet, now: None  # Commands still arrive.
             lost = now()
-            with pytest.raises(LinkError, match="nothing received"):
+            with pytest.raises(LinkError, match="nothing has been received"):
                 await taking_off
             assert now() - lost < 1.2
-            with pytest.raises(LinkError, match="while landing"):
+            with pytest.raises(LinkError, match="during the landing"):
                 await drone.close()
             await asyncio.sleep(6.0)
             assert emulated.truth().phase is Phase.LANDED
@@ -197,7 +197,7 @@ def test_an_emergency_during_take_off_ends_the_flight():
             taking_off = asyncio.create_task(drone.take_off())
             await asyncio.sleep(2.0)
             drone._sender.cut = True
-            with pytest.raises(FlightAbortedError, match="emergency while taking off"):
+            with pytest.raises(FlightAbortedError, match="emergency during the take-off"):
                 await taking_off
             assert not drone._sender.in_air
             await drone.close()
@@ -292,10 +292,10 @@ def test_missing_navdata_in_flight_raise_and_landing_ends_in_bounded_time():
                 None
             )  # Navdata no longer arrive, but commands do.
             lost = now()
-            with pytest.raises(LinkError, match="nothing received"):
+            with pytest.raises(LinkError, match="nothing has been received"):
                 await read_states(drone)
             assert now() - lost == pytest.approx(1.0, abs=0.05)
-            with pytest.raises(LinkError, match="while landing"):
+            with pytest.raises(LinkError, match="during the landing"):
                 await drone.close()
             assert now() - lost < 5.0
             await asyncio.sleep(3.0)
@@ -334,7 +334,7 @@ def test_a_drone_that_stops_answering_ends_the_context_in_bounded_time():
                     await read_states(drone)
 
             closed_at = []
-            with pytest.raises(LinkError, match="nothing received"):
+            with pytest.raises(LinkError, match="nothing has been received"):
                 await fly_until_silence()
             assert now() - closed_at[0] < 5.0
 
@@ -350,7 +350,7 @@ def test_an_unconfirmed_landing_is_noted_on_the_error_that_ended_the_flight():
             task.cancel()
             with pytest.raises(asyncio.CancelledError) as ended:
                 await task
-            assert "while landing" in ended.value.__notes__[0]
+            assert "during the landing" in ended.value.__notes__[0]
 
     run(fly())
 
@@ -369,7 +369,7 @@ def test_an_unconfirmed_landing_is_noted_when_the_landing_was_cancelled():
             task.cancel()
             with pytest.raises(asyncio.CancelledError) as ended:
                 await task
-            assert "while landing" in ended.value.__notes__[0]
+            assert "during the landing" in ended.value.__notes__[0]
 
     run(fly())
 
@@ -430,7 +430,7 @@ def test_connecting_fails_unless_the_limits_are_read_back(key, monkeypatch):
     async def fly():
         async with emulator() as emulated:
             drone = client_of(emulated, Limits(max_height=2.5))
-            with pytest.raises(LinkError, match=rf"{key} was set to .* reads back"):
+            with pytest.raises(LinkError, match=rf"{key} was set to .* the drone reports"):
                 await drone.connect()
             with pytest.raises(LinkError, match="not connected"):
                 await drone.take_off()
@@ -455,7 +455,10 @@ def test_a_setting_that_is_never_acknowledged_ends_the_handshake(monkeypatch):
 
 @pytest.mark.parametrize(
     ("piece", "message"),
-    [(b"x" * 100_000, "no end within 65536 bytes"), (b"x", "nothing received for 2 s")],
+    [
+        (b"x" * 100_000, "its end is missing after 65536 bytes"),
+        (b"x", "nothing has been received for 2 s"),
+    ],
 )
 def test_a_configuration_without_end_is_not_waited_for(piece, message):
     async def send_without_end(reader, writer):
@@ -483,7 +486,7 @@ def test_connecting_without_a_drone_raises_a_named_error():
     async def fly():
         async with emulator() as emulated:
             drone = client_of(emulated)
-        with pytest.raises(LinkError, match=r"no navdata from 127\.0\.0\.1"):
+        with pytest.raises(LinkError, match=r"no navdata has arrived from 127\.0\.0\.1"):
             await drone.connect()
 
     run(fly())

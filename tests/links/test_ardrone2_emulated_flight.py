@@ -269,7 +269,7 @@ def test_thrust_plant_does_not_depend_on_when_it_is_read():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"plant": "kite"}, "none of kit, paper, real, thrust"),
+        ({"plant": "kite"}, "give one of kit, paper, real, thrust"),
         ({"delay": -0.1}, "delay"),
         ({"jitter": float("nan")}, "jitter"),
         ({"delay": 101.0}, "from 0 to 100"),

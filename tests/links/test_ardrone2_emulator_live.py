@@ -400,7 +400,7 @@ def test_the_command_ends_at_once_without_input():
 
 def test_ctrl_c_ends_the_command(listens_to_ctrl_c):
     with started() as process:
-        assert "Ctrl-C ends the emulation" in process.stdout.readline()
+        assert "Ctrl-C ends the emulator" in process.stdout.readline()
         process.send_signal(signal.SIGINT)
         assert process.wait(20.0) == 130
         assert process.stderr.read() == "deadtime: interrupted\n"

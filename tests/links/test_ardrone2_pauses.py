@@ -102,7 +102,7 @@ def test_a_pause_ends_the_flight_if_no_clock_dates_the_navdata():
             await client.take_off()
             drone.pause_client(0.5)
             went_on = now()
-            with pytest.raises(FlightAbortedError, match="after a pause of this program"):
+            with pytest.raises(FlightAbortedError, match="since a pause of this program"):
                 await continue_program(client, "hover", 60)
             assert True not in [up for sent, up in refs(drone.received) if sent >= went_on]
 
@@ -176,7 +176,7 @@ def test_a_drone_that_landed_during_a_radio_outage_is_not_asked_to_take_off(out)
                 except FlightAbortedError as error:
                     ended = error
                 await asyncio.sleep(0.05)
-            assert "nothing received from 127.0.0.1 for 1.0 s" in str(ended)
+            assert "nothing has been received from 127.0.0.1 for 1.0 s" in str(ended)
             assert drone.phase == "landed"
             later = [up for sent, up in refs(drone.received) if sent > begun + 0.05]
             assert len(later) > 10

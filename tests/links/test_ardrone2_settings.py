@@ -119,7 +119,7 @@ def test_a_failed_connection_leaves_the_settings_unchanged(monkeypatch):
     async def fly():
         async with emulator() as emulated:
             monkeypatch.setattr(Settings, "set", refuses_a_height)
-            with pytest.raises(LinkError, match=r"altitude_max was set to .* reads back"):
+            with pytest.raises(LinkError, match=r"altitude_max was set to .* the drone reports"):
                 await client_of(emulated, Limits(max_height=2.5)).connect()
             assert emulated.drone.settings.climb_limit == 0.7
 

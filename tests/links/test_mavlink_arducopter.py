@@ -82,8 +82,8 @@ def test_what_set_points_need_is_put_back(set_points):
 
 def test_a_flight_goes_on_over_the_second_of_two_links():
     flown = json.loads(told_by("arducopter_two_links.py", timeout=240.0).splitlines()[-1])
-    assert [one.partition(";")[0] for one in flown["said"]] == [
-        "udp:127.0.0.1:14550: nothing received for 0.2 s"
+    assert [one.partition(". ")[0] for one in flown["said"]] == [
+        "udp:127.0.0.1:14550: nothing has been received for 0.2 s"
     ]
     for place in ("first", "second"):
         assert flown[place]["echo"] == pytest.approx(0.3)

@@ -169,7 +169,7 @@ def test_the_switch_that_ignores_checksums_is_refused():
         capture_output=True,
         text=True,
     )
-    assert "accept damaged frames" in done.stderr
+    assert "accepts damaged frames" in done.stderr
 
 
 def test_copies_and_overtaken_positions_are_ignored():

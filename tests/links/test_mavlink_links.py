@@ -55,8 +55,8 @@ def test_a_flight_goes_on_over_another_link():
             vehicle.cut = {FIRST}
             with pytest.warns(RuntimeWarning) as said:
                 states = await told(link, 0.3, 2.0)
-            assert [str(one.message).partition(";")[0] for one in said] == [
-                "udp:127.0.0.1:14550: nothing received for 0.2 s"
+            assert [str(one.message).partition(". ")[0] for one in said] == [
+                "udp:127.0.0.1:14550: nothing has been received for 0.2 s"
             ]
             assert "over udp:127.0.0.1:14551" in str(said[0].message)
             assert commanded(vehicle, place) == {SECOND}
@@ -87,7 +87,9 @@ def test_without_any_link_the_flight_ends_as_without_one():
             await link.connect()
             await link.take_off()
             vehicle.cut = {FIRST, SECOND}
-            with pytest.raises(FlightAbortedError, match=r"nothing received from udp.*14551 for 1"):
+            with pytest.raises(
+                FlightAbortedError, match=r"nothing has been received from udp.*14551 for 1"
+            ):
                 await told(link, 0.2, 3.0)
             with pytest.raises(LinkError, match="lands by its own failsafe"):
                 await link.close()
@@ -115,9 +117,7 @@ def test_links_to_two_vehicles_of_one_id_are_refused():
             other._begin -= 7.0
             await MAVLinkVehicle(BOTH, LIMITS).connect()
 
-    with pytest.raises(
-        LinkError, match=r"answers over .*14551 is not the one that answers over .*14550"
-    ):
+    with pytest.raises(LinkError, match=r"14551 and .*14550 have different clocks"):
         run(connect())
 
 
@@ -132,13 +132,13 @@ def test_another_vehicle_does_not_take_over():
             other.cut = set()
             await told(link, 0.1, 1.0)
             vehicle.cut = {FIRST}
-            with pytest.raises(FlightAbortedError, match="nothing received"):
+            with pytest.raises(FlightAbortedError, match="nothing has been received"):
                 await told(link, 0.1, 3.0)
             assert not other.set_points
             with pytest.raises(LinkError, match="lands by its own failsafe"):
                 await link.close()
 
-    with pytest.warns(RuntimeWarning, match=r"14551: nothing received for .* it was in reserve"):
+    with pytest.warns(RuntimeWarning, match=r"14551: nothing has been received for .* in reserve"):
         run(flight())
 
 
@@ -152,7 +152,9 @@ def test_a_silent_link_that_stands_by_is_named_once():
             with pytest.warns(RuntimeWarning) as said:
                 await asyncio.sleep(6.0)
             (one,) = said
-            assert "14551: nothing received for 2.0 s; it was in reserve" in str(one.message)
+            assert "14551: nothing has been received for 2.0 s. This link was in reserve" in str(
+                one.message
+            )
 
     run(connected())
 
@@ -167,7 +169,7 @@ def test_a_warning_that_is_an_error_does_not_keep_the_links_from_being_looked_at
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
                 await asyncio.sleep(0.28)
-            with pytest.raises(LinkError, match="nothing received for"):
+            with pytest.raises(LinkError, match="nothing has been received for"):
                 await link.state()
             await link.close()
             assert not vehicle.armed

@@ -141,9 +141,9 @@ def test_an_error_that_leaves_old_values_names_them_and_their_file(tmp_path):
             await link.connect()
             await link.take_off()
             vehicle.drop = lambda message: True
-            with pytest.raises(LinkError, match="nothing received"):
+            with pytest.raises(LinkError, match="nothing has been received"):
                 await told(link, 0.1, 5.0)
-            with pytest.raises(LinkError, match="while landing") as ended:
+            with pytest.raises(LinkError, match="during the landing") as ended:
                 await link.close()
             (note,) = ended.value.__notes__
             assert "GUID_TIMEOUT = 3, FS_GCS_TIMEOUT = 5, FS_GCS_ENABLE = 0" in note

@@ -131,13 +131,13 @@ def test_a_network_survives_conversion_to_text(network):
     [
         (lambda: Network(loss=1.5), "probability"),
         (lambda: Network(delay=-0.1), "negative"),
-        (lambda: Network(blackouts=((2.0, 1.0),)), "empty"),
+        (lambda: Network(blackouts=((2.0, 1.0),)), "no duration"),
         (lambda: Bursts(0.1, 0.0), "never end"),
         (lambda: Bursts.of(0.9, 1.5), "longer"),
         (lambda: Bursts.of(0.05, math.inf), "finite"),
-        (lambda: network_of("gamma", 0.0, 0.01), "cannot vary"),
-        (lambda: ShiftedGamma(0.05, 0.05, 0.01), "not above"),
-        (lambda: network_of("pareto"), "none of"),
+        (lambda: network_of("gamma", 0.0, 0.01), "cannot have"),
+        (lambda: ShiftedGamma(0.05, 0.05, 0.01), "must be above"),
+        (lambda: network_of("pareto"), "do not exist"),
         (lambda: network_from("{}"), "describe"),
     ],
 )

@@ -29,14 +29,20 @@ def test_settings_are_read_with_their_sections():
 @pytest.mark.parametrize(
     ("dump", "says"),
     [
-        (b"a:b = c\n", "no NUL byte that ends the configuration, at byte 8"),
-        (b"a:b = c\n\0a:d = e\n\0", "bytes after the NUL that ends the configuration, at byte 9"),
-        (b"a:b = c\nnonsense\n\0", 'not of the form "section:key = value", at byte 8'),
+        (b"a:b = c\n", "the NUL byte at the end of the configuration is missing, at byte 8"),
+        (
+            b"a:b = c\n\0a:d = e\n\0",
+            "bytes after the NUL byte that ends the configuration, at byte 9",
+        ),
+        (b"a:b = c\nnonsense\n\0", 'does not have the form "section:key = value", at byte 8'),
         (b"b = c\n\0", "at byte 0"),
-        (b"a:b = \xff\n\0", "no UTF-8 text, at byte 6"),
+        (b"a:b = \xff\n\0", "not UTF-8 text, at byte 6"),
         (b"a:b = \x1b[2J\n\0", "at byte 0"),
         (b"a:b = 1\na:b = 2\n\0", "the key a:b has two different values, at byte 8"),
-        (b"a:b = c\n" * 3000 + b"\0", "24001 bytes, of which there may be 16384 at most"),
+        (
+            b"a:b = c\n" * 3000 + b"\0",
+            "24001 bytes are too many, because at most 16384 are allowed",
+        ),
     ],
 )
 def test_invalid_configurations_are_refused_with_the_reason(dump, says):
@@ -105,11 +111,11 @@ def test_loop_packets_hold_finite_numbers(name, bad):
 def test_invalid_loop_packets_are_refused():
     packet = ANSWER.encode()
     for wrong, says in [
-        (b"", "0 bytes in place of 56"),
-        (packet[:-1], "55 bytes in place of 56"),
-        (packet + b"\0", "57 bytes in place of 56"),
-        (b"DTL2" + packet[4:], "0x44544c32 is the header of no known format"),
-        (packet[:32] + struct.pack("<d", -1e-9) + packet[40:], "held=.* is out of its range"),
+        (b"", "0 bytes instead of 56"),
+        (packet[:-1], "55 bytes instead of 56"),
+        (packet + b"\0", "57 bytes instead of 56"),
+        (b"DTL2" + packet[4:], "the header 0x44544c32 does not belong to a known format"),
+        (packet[:32] + struct.pack("<d", -1e-9) + packet[40:], "held=.* is outside of its range"),
     ]:
         with pytest.raises(PacketError, match=says):
             LoopPacket.decode(wrong)
@@ -144,7 +150,7 @@ def test_bare_doubles_have_the_layout_of_simulink():
     assert encode_doubles([1.0, -2.5]) == bytes.fromhex("000000000000f03f00000000000004c0")
     assert decode_doubles(encode_doubles([1.0, -2.5]), 2) == (1.0, -2.5)
     for data, count in [(bytes(15), 1), (bytes(16), 1), (bytes(16), 3), (b"", 1)]:
-        with pytest.raises(PacketError, match="bytes in place of"):
+        with pytest.raises(PacketError, match="bytes instead of"):
             decode_doubles(data, count)
     with pytest.raises(PacketError, match="give a finite number, at byte 8"):
         decode_doubles(struct.pack("<2d", 1.0, math.nan), 2)

@@ -74,7 +74,7 @@ def test_real_packets_are_decoded_and_encoded_unchanged():
     # One packet is broken in the recording.
     assert len(packets) == 500
     assert broken == [
-        "navdata: the option of tag 0 says that it has 0 bytes: 4 at least and 2174 at most are "
+        "navdata: the option of tag 0 has a stated size of 0 bytes, but only 4 to 2174 are "
         "possible, at byte 16"
     ]
     # Every twelfth packet of 200 a second.
@@ -181,17 +181,23 @@ def test_changing_a_field_leaves_the_bytes_around_it():
 @pytest.mark.parametrize(
     ("packet", "says"),
     [
-        (b"", "0 bytes, of which it takes 24 at least, at byte 0"),
+        (b"", "0 bytes are too few, because 24 are needed, at byte 0"),
         (FULL[:15], "15 bytes"),
-        (FULL[:16], "the last option is no checksum, at byte 16"),
-        (b"GET / HTTP/1.1\r\n\r\n......", "0x20544547 is the header of no known format"),
-        (FULL[:18] + b"\x03\x00" + FULL[20:], "the option of tag 0 says that it has 3 bytes"),
-        (FULL[:18] + b"\x00\x00" + FULL[20:], "the option of tag 0 says that it has 0 bytes"),
-        (FULL[:18] + b"\xff\xff" + FULL[20:], "the option of tag 0 says that it has 65535 bytes"),
-        (FULL[:-8], "the last option is no checksum"),
-        (FULL + b"\x00", "the last option is no checksum"),
+        (FULL[:16], "the last option is not a checksum, at byte 16"),
+        (
+            b"GET / HTTP/1.1\r\n\r\n......",
+            "the header 0x20544547 does not belong to a known format",
+        ),
+        (FULL[:18] + b"\x03\x00" + FULL[20:], "the option of tag 0 has a stated size of 3 bytes"),
+        (FULL[:18] + b"\x00\x00" + FULL[20:], "the option of tag 0 has a stated size of 0 bytes"),
+        (
+            FULL[:18] + b"\xff\xff" + FULL[20:],
+            "the option of tag 0 has a stated size of 65535 bytes",
+        ),
+        (FULL[:-8], "the last option is not a checksum"),
+        (FULL + b"\x00", "the last option is not a checksum"),
         (FULL[:50] + bytes([FULL[50] ^ 8]) + FULL[51:], "the checksum is"),
-        (FULL * 5, "10950 bytes, of which there may be 8192 at most"),
+        (FULL * 5, "10950 bytes are too many, because at most 8192 are allowed"),
     ],
 )
 def test_invalid_packets_are_refused_with_the_reason(packet, says):

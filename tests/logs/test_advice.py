@@ -57,7 +57,7 @@ def test_an_old_firmware_has_no_system_identification(flown):
     found = lines(log)
     assert not any("SID_AXIS" in line for line in found)
     assert "fly" in found[-1]
-    assert "each held for" in found[-1]
+    assert "hold each for" in found[-1]
 
 
 def test_a_plane_logs_attitude_in_each_loop_by_another_bit(flown):
@@ -83,11 +83,11 @@ def test_betaflight_names_fields_rate_and_chirp(flown):
                  looptime=125.0, pid_process_denom=2.0)  # fmt: skip
     found = lines(log)
     assert found[0].startswith("set blackbox_disable_setpoint = OFF")
-    assert found[1].startswith("set blackbox_sample_rate = 1/4: 1000 rows a second")
+    assert found[1].startswith("set blackbox_sample_rate = 1/4, to log 1000 rows per second")
     assert found[2].startswith("set debug_mode = CHIRP, chirp_amplitude_roll = 230")
     old = as_log(flown, "Betaflight", "Betaflight 3.4.0 (a)", None, columns)
     assert lines(old) == [
-        "this firmware logs no setpoint: update to 4.3 or later "
+        "this firmware does not log setpoint: update to version 4.3 or later "
         "(Betaflight: CLI commands, blackbox_disable_*)"
     ]
 
@@ -110,7 +110,8 @@ def test_a_setpoint_at_rest_is_to_be_moved(flown):
     rest = Series(loop.setpoint.time, np.zeros(len(loop.setpoint)), "rad/s", "RATE.RDes")
     log = as_log(flown, "PX4", "", replace(loop, setpoint=rest), SDLOG_PROFILE=17.0)
     assert lines(log) == [
-        "roll rate: move its setpoint; in this log the response follows almost no part of it"
+        "roll rate: move the setpoint, because in this log the response follows almost no part "
+        "of it"
     ]
 
 

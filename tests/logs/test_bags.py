@@ -67,7 +67,7 @@ def test_topics_fields_and_rates_of_each_format(folder, name, form, speed):
     np.testing.assert_allclose(recording.sent.values, values)
     assert np.isnan(recording.reference).all()
     assert f"{COMMAND} to /state:{speed}" in recording.source
-    assert "by the times of reception, since /cmd_vel has no other" in recording.source
+    assert "by the times of reception, because /cmd_vel has no other times" in recording.source
 
 
 def test_places_in_arrays_are_fields_and_scans_are_not(folder):
@@ -100,11 +100,11 @@ def test_the_delay_of_the_robot_is_found_with_the_way_of_its_messages(folder):
 @pytest.mark.parametrize(
     ("header", "asked", "used", "why"),
     [
-        (1.0, None, "header", "by the times in the headers, which all topics have"),
-        (1.0, "received", "received", "by the times of reception, as asked for"),
-        (False, None, "received", "since /cmd_vel has no other"),
-        (500.0, None, "received", "since the headers are of different clocks"),
-        (1.0, "header", "header", "by the times in the headers, as asked for"),
+        (1.0, None, "header", "by the times in the headers, because all topics have these times"),
+        (1.0, "received", "received", "by the times of reception, which were asked for"),
+        (False, None, "received", "because /cmd_vel has no other times"),
+        (500.0, None, "received", "because the times in the headers come from different clocks"),
+        (1.0, "header", "header", "by the times in the headers, which were asked for"),
     ],
 )
 def test_times_of_all_topics_are_of_one_kind(tmp_path, header, asked, used, why):
@@ -121,10 +121,10 @@ def test_times_of_all_topics_are_of_one_kind(tmp_path, header, asked, used, why)
 @pytest.mark.parametrize(
     ("command", "output", "message"),
     [
-        ("/cmd:x", SPEED, "no topic '/cmd': its topics are /cmd_vel, /state"),
-        ("/cmd_vel:linear.w", SPEED, "no field 'linear.w': linear.x, linear.y"),
-        ("/cmd_vel", SPEED, "fields, of which one is to be named: linear.x"),
-        (COMMAND, "/state:scan[3]", r"no field 'scan\[3\]': header.stamp.sec"),
+        ("/cmd:x", SPEED, "no topic '/cmd'. Its topics are /cmd_vel, /state"),
+        ("/cmd_vel:linear.w", SPEED, "no field 'linear.w'. Its fields are linear.x, linear.y"),
+        ("/cmd_vel", SPEED, "fields, so one has to be named. Its fields are linear.x"),
+        (COMMAND, "/state:scan[3]", r"no field 'scan\[3\]'. Its fields are header.stamp.sec"),
     ],
 )
 def test_a_wrong_name_is_answered_by_those_that_exist(folder, command, output, message):
@@ -173,12 +173,12 @@ def test_what_is_no_bag_is_refused(tmp_path):
         path.write_bytes(data)
         with pytest.raises(dtm.RecordingError, match=message):
             open_bag(path)
-    with pytest.raises(dtm.RecordingError, match=r"without the metadata\.yaml"):
+    with pytest.raises(dtm.RecordingError, match=r"without the file metadata\.yaml"):
         open_bag(tmp_path)
     named = tmp_path / "bag.dat"
     bags.ros1(tmp_path / "a.bag")
     (tmp_path / "a.bag").rename(named)
-    with pytest.raises(dtm.RecordingError, match=r"its name ends in \.bag"):
+    with pytest.raises(dtm.RecordingError, match=r"its name does not end in \.bag"):
         open_bag(named)
     with pytest.raises(dtm.RecordingError, match=r"open it with deadtime\.logs\.open_bag"):
         dtm.open_log(named)
@@ -191,7 +191,7 @@ def test_a_bag_that_is_cut_off_is_read_as_far_as_it_goes(tmp_path, compression, 
     path = tmp_path / "cut.mcap"
     path.write_bytes(data[: int(share * len(data))])
     bag = open_bag(path)
-    assert bag.remarks == ("the file is cut off or damaged, and is read as far as it goes",)
+    assert bag.remarks == ("the file is cut off or damaged, so it is read only up to this place",)
     assert 0.5 * share < bag.duration / 20.0 <= 1.0
     assert len(bag.recording(COMMAND, SPEED)) > 100
 
@@ -227,7 +227,7 @@ def test_messages_that_cannot_be_decoded_are_named(tmp_path):
         log.finish()
     bag = open_bag(path)
     assert list(bag.topics) == ["/known"]
-    assert bag.remarks == ("not decoded, because the encoding is not known: /strange",)
+    assert bag.remarks == ("not decoded, because their encoding is not known: /strange",)
 
 
 @pytest.mark.parametrize(

@@ -207,7 +207,7 @@ def test_what_stands_before_a_cut_is_read(cut):
     count = contents.topics["main"].time.size
     assert_holds(contents, log, rows[:count])
     assert count > 100 - 3 - cut / 30
-    assert contents.remarks[-1] == "The log has no end mark, so it was cut off."
+    assert contents.remarks[-1] == "The log has no end mark, so it was probably cut off."
 
 
 def several():
@@ -222,7 +222,7 @@ def test_the_longest_of_several_flights_is_read():
     log, rows = logs[1]
     assert_holds(contents, log, rows)
     assert contents.remarks == (
-        "The file holds 3 flights, of which this is flight 2: flight 1 of 0.0122 s, "
+        "The file contains 3 flights, and this is flight 2: flight 1 of 0.0122 s, "
         "flight 2 of 0.0497 s, flight 3 of 0.00475 s.",
     )
 
@@ -240,7 +240,7 @@ def test_a_log_is_opened_at_one_of_its_flights(tmp_path):
     durations = [dtm.open_log(path, flight=number).duration for number in (1, 2, 3)]
     assert dtm.open_log(path).duration == max(durations) == durations[1]
     assert durations[2] < durations[0] < durations[1]
-    with pytest.raises(RecordingError, match="flight 4 of 3: give a number from 1 to 3"):
+    with pytest.raises(RecordingError, match="flight=4 is given: give a number from 1 to 3"):
         dtm.open_log(path, flight=4)
     other = tmp_path / "other.log"
     other.write_text("FMT, 1, 23, ATT, Qcc, TimeUS,DesRoll,Roll\nATT, 1, 2, 3\n")
@@ -254,19 +254,19 @@ def test_a_flight_that_cannot_be_read_is_named():
     contents = read_blackbox(broken + flight(rows, log), "made.bbl")
     assert_holds(contents, log, rows)
     assert contents.remarks[-1] == (
-        'Not read: flight 1: data version "1" is not read, only version 2.'
+        'Not read: flight 1: version "1" of the data cannot be read, only version 2.'
     )
-    with pytest.raises(RecordingError, match=r'^made\.bbl: flight 1: data version "1"'):
+    with pytest.raises(RecordingError, match=r'^made\.bbl: flight 1: version "1" of the data'):
         read_blackbox(broken + flight(rows, log), "made.bbl", flight=1)
-    with pytest.raises(RecordingError, match="flight 3 of 2: give a number from 1 to 2"):
+    with pytest.raises(RecordingError, match="flight=3 is given: give a number from 1 to 2"):
         read_blackbox(broken + flight(rows, log), "made.bbl", flight=3)
 
 
 BAD_HEADS = {
     "no log": (b"H Product", b"H Prodduct", "the line .* is missing"),
-    "another version": (b"version:2", b"version:3", 'data version "3"'),
-    "no time": (b",time,", b",tide,", 'defines no field "time"'),
-    "too few codes": (b"I encoding:1,1,", b"I encoding:1,", "encodes another number"),
+    "another version": (b"version:2", b"version:3", 'version "3" of the data'),
+    "no time": (b",time,", b",tide,", 'does not define the field "time"'),
+    "too few codes": (b"I encoding:1,1,", b"I encoding:1,", "another number of encodings"),
     "no number": (b"I encoding:1,1", b"I encoding:1,x", '"Field I encoding" .* damaged'),
     "no code": (b"I encoding:1,1", b"I encoding:1,2", "encoding 2 of a field is not known"),
     "no predictor": (b"P predictor:6,2", b"P predictor:6,99", "predictor 99"),
@@ -382,7 +382,7 @@ def test_few_bytes_that_pretend_to_hold_many_values_are_refused():
     log = Log(fields=fields)
     data = log.head() + b"I\0\0" * 700_000
     tracemalloc.start()
-    with pytest.raises(RecordingError, match="more than so few bytes of a flight hold"):
+    with pytest.raises(RecordingError, match="too many for so few bytes of a flight"):
         read_blackbox(data, "bomb.bbl")
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()

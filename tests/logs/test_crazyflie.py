@@ -98,7 +98,7 @@ def test_what_stands_before_a_cut_is_read(cut):
     count = contents.topics["fixedFrequency"].time.size
     assert count >= 299 - cut / 17
     assert_fixed(contents, fixed(count))
-    assert contents.remarks[0].startswith("The checksum does not match")
+    assert contents.remarks[0].startswith("The checksum is wrong")
 
 
 def test_damage_is_passed_over():
@@ -128,15 +128,15 @@ def named(text):
 
 
 BAD = {
-    "nothing": (b"", "would start with the byte 0xbc"),
-    "another format": (b"PK\3\4", "would start with the byte 0xbc"),
+    "nothing": (b"", "first byte is not 0xbc"),
+    "another format": (b"PK\3\4", "first byte is not 0xbc"),
     "a first byte alone": (b"\xbc", "definitions of the events are damaged"),
-    "another version": (sealed(definitions({}, version=3)), "version 3 is not known"),
-    "no events": (sealed(definitions({})), "no record that can be read"),
-    "no records": (sealed(definitions(EVENTS)), "no record that can be read"),
-    "a type of text": (named(b"value(s)"), r'variable "value\(s\)" has no known type'),
-    "no type": (named(b"value"), 'variable "value" has no known type'),
-    "a name without end": (definitions(EVENTS)[:20], "name at byte .* has no end"),
+    "another version": (sealed(definitions({}, version=3)), "version 3 of the log cannot be read"),
+    "no events": (sealed(definitions({})), "contains no record that can be read"),
+    "no records": (sealed(definitions(EVENTS)), "contains no record that can be read"),
+    "a type of text": (named(b"value(s)"), r'variable "value\(s\)" does not end in a known type'),
+    "no type": (named(b"value"), 'variable "value" does not end in a known type'),
+    "a name without end": (definitions(EVENTS)[:20], "name that begins at byte .* has no end"),
     "an event twice": (
         sealed(definitions({1: ("a", [])}).replace(b"\2\0\1\0", b"\2\0\2\0") + b"\1\0b\0\0\0"),
         "event 1 is defined twice",
@@ -150,7 +150,7 @@ BAD = {
 
 @pytest.mark.parametrize(("data", "message"), BAD.values(), ids=BAD.keys())
 def test_what_is_no_log_is_refused(data, message):
-    with pytest.raises(RecordingError, match=f"^bad: .*{message}"):
+    with pytest.raises(RecordingError, match=f"^bad.*{message}"):
         read_crazyflie(data, "bad")
 
 

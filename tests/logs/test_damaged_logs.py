@@ -64,7 +64,9 @@ def test_the_small_logs_are_read_and_small(name, tmp_path):
     log = dtm.open_log(path)
     assert log.format == name
     assert log.loops
-    assert log.remarks == (("the logger lost data 1 times, 0.03 s in all",) * (name == "ULog"))
+    assert log.remarks == (
+        ("the logger lost data 1 times, for 0.03 s in total",) * (name == "ULog")
+    )
 
 
 @pytest.mark.parametrize(
@@ -130,9 +132,9 @@ def test_a_log_that_is_cut_off_is_read_as_far_as_it_goes(name, share, tmp_path):
     ("data", "words"),
     [
         (b"", "is empty"),
-        (b"\x07\x03time", "is not a log of a known format: it begins with 07 03 74 69"),
-        (b"time,reference\n0,1\n", rf"is a text, and no log .*: {TABLE}"),
-        ("höhe\n".encode("latin-1"), rf"is a text, and no log .*: {TABLE}"),
+        (b"\x07\x03time", "is not a log of a known format, because it begins with 07 03 74 69"),
+        (b"time,reference\n0,1\n", rf"is a text, but not a log .*: {TABLE}"),
+        ("höhe\n".encode("latin-1"), rf"is a text, but not a log .*: {TABLE}"),
         (
             b"version https://git-lfs.github.com/spec/v1\noid sha256:da9\nsize 11927552\n",
             "is a Git LFS pointer instead of the file itself: run `git lfs pull`",
@@ -142,10 +144,10 @@ def test_a_log_that_is_cut_off_is_read_as_far_as_it_goes(name, share, tmp_path):
         (b"ARROW1\0\0" + bytes(20), rf"is an Arrow table: {TABLE}"),
         (b"MATLAB 5.0 MAT-file" + bytes(200), rf"is a MAT file: {TABLE}"),
         (b"MATLAB 7.3 MAT-file" + bytes(200), rf"is a MAT file: {TABLE}"),
-        (b"PK\x03\x04" + bytes(200), "is a zip archive, .*: unpack it"),
-        (b"\xa3\x95\x80" + bytes(200), "has no message of a known format"),
-        (b"\xa3\x95\x07", "has no message of a known format"),
-        (b"FMT, 1, 2, ATT, Qc, TimeUS\nATT, 1, 2\n", "has no message of a known format"),
+        (b"PK\x03\x04" + bytes(200), "is a zip archive, .*: unpack the archive"),
+        (b"\xa3\x95\x80" + bytes(200), "contains no message of a known format"),
+        (b"\xa3\x95\x07", "contains no message of a known format"),
+        (b"FMT, 1, 2, ATT, Qc, TimeUS\nATT, 1, 2\n", "contains no message of a known format"),
     ],
 )
 def test_other_files_are_refused_with_what_is_wrong(data, words, tmp_path):
@@ -173,7 +175,7 @@ def test_a_tlog_without_an_autopilot_is_refused(tmp_path):
 
 
 def test_missing_files_and_folders(tmp_path):
-    with pytest.raises(dtm.RecordingError, match="there is no file"):
+    with pytest.raises(dtm.RecordingError, match="does not exist"):
         dtm.open_log(tmp_path / "flight.ulg")
     with pytest.raises(dtm.RecordingError, match="is a folder"):
         dtm.open_log(tmp_path)
@@ -191,7 +193,7 @@ def test_a_format_of_length_zero_does_not_hang(tmp_path):
     path.write_bytes(log.data)
     found = dtm.open_log(path)
     assert len(found.loops["roll"].setpoint) == 20
-    assert any("do not belong to a message and are left out" in remark for remark in found.remarks)
+    assert any("do not belong to a message, and are left out" in remark for remark in found.remarks)
 
 
 def test_damage_in_the_middle_costs_only_the_messages_in_it(tmp_path):
@@ -239,7 +241,9 @@ def test_text_of_a_log_does_not_reach_a_terminal_as_controls(tmp_path):
     path = tmp_path / "flight"
     hostile = b"gy\x1b[2J\nro"
     path.write_bytes(small_crazyflie().replace(b"gyro.x(f)", hostile))
-    with pytest.raises(dtm.RecordingError, match=r'"gy\\x1b\[2J\\nro" has no known type') as caught:
+    with pytest.raises(
+        dtm.RecordingError, match=r'"gy\\x1b\[2J\\nro" does not end in a known type'
+    ) as caught:
         dtm.open_log(path)
     assert str(caught.value).isprintable()
     path.write_bytes(small_blackbox().replace(b"Betaflight 4.5.1", b"Beta\x1b[2J\r"))

@@ -83,7 +83,7 @@ def test_a_response_that_precedes_its_setpoint_has_no_time(loop):
     assert np.isnan(found.time)
     assert found.estimate is None
     assert found.plain.correlation.interval[1] < 0.0
-    why = r"by cross-correlation the response precedes its setpoint by 1\d\d\.\d+ ms \(95 %: 1"
+    why = r"by cross-correlation the response comes 1\d\d\.\d+ ms before its setpoint \(95 %: 1"
     assert re.match(why, found.reason)
 
 

@@ -257,7 +257,9 @@ def test_few_windows_are_an_indication(alike):
     assert alike.verdict == "reliable"
     few = answer_of(flown([0.03], seconds=1.6))
     assert few.verdict == "indication"
-    assert few.reason == "too few windows determine the time by themselves: 1, but 4 are needed"
+    assert (
+        few.reason == "a time needs 4 windows that determine the time alone, but there are only 1"
+    )
 
 
 def test_a_plant_that_is_not_determined_has_a_time_where_windows_show_it(alike):
@@ -266,7 +268,7 @@ def test_a_plant_that_is_not_determined_has_a_time_where_windows_show_it(alike):
         best=fit.best,
         recording=fit.recording,
         verdict="none",
-        reason="the command moves too little",
+        reason="the command changes too little",
     )
     found = replace(alike, estimate=unknown)
     assert _no_answer(found) == ""
@@ -286,7 +288,7 @@ def test_a_response_against_its_command_is_no_answer():
     parts = [replace(one, output=-one.output) for one in flown([0.03] * 2)]
     found = answer_of(parts)
     assert found.verdict == "none"
-    assert found.reason.startswith("the response moves against its command")
+    assert found.reason.startswith("the response moves in the opposite direction")
     assert found.estimate is None
 
 

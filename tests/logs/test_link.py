@@ -91,8 +91,8 @@ def test_transport_drift_and_loss_are_those_of_the_packets(opened, drift):
 def test_without_timesync_only_what_varies_is_known(opened):
     log = opened(made(timesync=False)[0])
     assert log.link.half_round_trip is None
-    assert "above the least" in log.link.summary()
-    assert "without TIMESYNC the least is not known" in log.summary()
+    assert "above the shortest time" in log.link.summary()
+    assert "Without TIMESYNC the shortest time is not known" in log.summary()
     assert log.to_dict()["link"]["half_round_trip"] is None
 
 
@@ -102,11 +102,11 @@ def test_the_report_has_the_link(opened, tmp_path):
     found = dtm.latency(log, loops=("vertical speed",))
     text = found.details()
     assert log.link.summary() in text
-    assert "is stamped where it was sent, on the ground" in text
+    assert "has the time at which the ground sent it" in text
     assert found.to_dict()["link"]["lost"] == log.link.lost
     page = found.report(tmp_path / "page.html").read_text(encoding="utf-8")
     assert "<h2>The link</h2>" in page
-    assert "half the least round trip" in page
+    assert "half of the shortest round trip" in page
 
 
 def test_inspect_tells_it(opened, tmp_path):
@@ -114,7 +114,7 @@ def test_inspect_tells_it(opened, tmp_path):
     path = tmp_path / "a.tlog"
     path.write_bytes(data)
     assert found("inspect", path)["link"]["lost"] == lost
-    assert "half the least round trip" in " ".join(run("inspect", path).stdout.split())
+    assert "half of the shortest round trip" in " ".join(run("inspect", path).stdout.split())
 
 
 def test_a_short_log_and_other_formats_have_none(opened):

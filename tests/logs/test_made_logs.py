@@ -37,7 +37,7 @@ def test_a_dataflash_log(opened):
     assert loop.setpoint.rate == pytest.approx(50.0)
     assert np.array_equal(loop.setpoint.values[:-3], loop.response.values[3:])
     assert loop.segments == ((loop.setpoint.time[0], loop.setpoint.time[-1]),)
-    with pytest.raises(ValueError, match="its loops are roll, pitch"):
+    with pytest.raises(ValueError, match="Its loops are roll, pitch"):
         log.loop("heave")
 
 
@@ -229,7 +229,9 @@ def test_a_copy_of_the_estimate_is_left_out(opened):
         log.add("vehicle_local_position_setpoint", at, np.nan, speed[k - 1] if copied else k // 50)
     loop = opened(log).loops["vertical speed"]
     assert np.array(loop.segments) == pytest.approx(np.array([(0.0, 3.0), (5.0, 7.98)]), abs=0.05)
-    assert loop.why_left_out == ("1.98 s are left out: the setpoint is a copy of the estimate",)
+    assert loop.why_left_out == (
+        "1.98 s are left out: the setpoint is only a copy of the estimate",
+    )
 
 
 def test_lift_off_and_touch_down_are_left_out(opened):
@@ -247,8 +249,8 @@ def test_lift_off_and_touch_down_are_left_out(opened):
     loop = opened(log).loops["vertical speed"]
     assert np.array(loop.segments) == pytest.approx(np.array([(3.0, 4.5)]), abs=0.03)
     ground, thrust = loop.why_left_out
-    assert ground.endswith("the vehicle is on the ground or touches down")
-    assert thrust.endswith("the thrust is raised for take-off")
+    assert ground.endswith("the vehicle is on the ground or lands")
+    assert thrust.endswith("the thrust is rising for the take-off")
 
 
 def test_a_setpoint_that_rests_on_coarse_values_is_no_copy(opened):
@@ -281,8 +283,8 @@ def test_modes_gaps_and_missing_numbers_bound_the_segments(opened):
     assert np.array(loop.segments) == pytest.approx(expected, abs=0.05)
     for words in (
         "the vehicle is disarmed",
-        "the flight mode does not close this loop",
-        "no number",
+        "in this flight mode the loop is open",
+        "not a number",
         "a gap",
     ):
         assert any(words in reason for reason in loop.why_left_out), words
@@ -311,7 +313,7 @@ def test_times_that_repeat_or_go_back_are_left_out(opened):
         log.add("ATT", at, 100 * (k % 5), 50)
     found = opened(log)
     assert len(found.loops["roll"].setpoint) == 97
-    assert "ATT: 3 rows whose time repeats or goes back are left out" in found.remarks
+    assert "ATT: 3 rows are left out because their time repeats or goes back" in found.remarks
 
 
 def tlog(rows=500, late=0.05, autopilot=3):

@@ -111,7 +111,7 @@ def test_a_response_that_does_not_answer_has_no_time_but_a_reason():
     deaf = Series(came.time, 0.01 * np.sin(came.time), "rad", "deaf")
     found = moves_of(asked, deaf, segments, longest=0.8, between="straight")
     assert np.isnan(found.median)
-    assert "answers to" in found.reason
+    assert "follows 0" in found.reason
     assert "none" in found.headline()
 
 

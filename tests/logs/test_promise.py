@@ -93,7 +93,7 @@ def test_nothing_is_promised_where_nothing_moves_or_follows():
     sticks = Series(time, np.repeat(np.random.default_rng(3).standard_normal(40), 50), "", "asked")
     found = promised(sticks, came, [(0.0, 39.0)], longest=0.5)
     assert np.isinf(found.noise)
-    assert found.line().startswith("there is no time")
+    assert found.line().startswith("the response does not follow")
 
 
 def test_each_followed_loop_of_a_log_has_a_promise(tmp_path):

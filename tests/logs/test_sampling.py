@@ -122,8 +122,8 @@ def test_clocks_that_drift_apart_are_named_with_their_rate():
     one, _ = answered("rate", "clocks drift by 100 ppm", 1001, part=0.4)
     assert one.verdict == "indication"
     assert (
-        "the stamps of vehicle_torque_setpoint.xyz[0] and vehicle_angular_velocity.xyz[0] drift "
-        "apart by 100 ppm: if they are those of two clocks, the time is wrong by 100 µs for each"
+        "the time stamps of vehicle_torque_setpoint.xyz[0] and vehicle_angular_velocity.xyz[0] "
+        "drift apart by 100 ppm. If they come from two clocks, the time is wrong by 100 µs for each"
     ) in one.reason
 
 

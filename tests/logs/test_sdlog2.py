@@ -40,6 +40,6 @@ def test_what_is_landed_or_disarmed_is_left_out(opened):
     reasons = log.loops["roll rate"].why_left_out
     assert [reason.rpartition(": ")[2] for reason in reasons] == [
         "the vehicle is disarmed",
-        "the vehicle is on the ground or touches down",
+        "the vehicle is on the ground or lands",
     ]
     assert log.loops["roll rate"].followed == pytest.approx(1.98)

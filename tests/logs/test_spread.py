@@ -67,7 +67,7 @@ def test_a_vehicle_that_takes_longer_when_it_moves_less_shows_as_a_slope():
         low, high = found.slope_interval
         held.append(low < -0.03 < high)
         signs.append(high < 0.0)
-        widths.append("longer where it moves half as much" in found.line())
+        widths.append("longer if the command moves half as much" in found.line())
     assert np.mean(held) > 0.92
     assert np.mean(signs) > 0.9
     assert widths == signs

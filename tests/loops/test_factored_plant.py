@@ -54,7 +54,7 @@ def test_each_number_is_replaced_by_its_name():
     moved = loop.replace(lag_2=0.07, zero=0.01, gain=0.5, Kp=2.0)
     assert moved.plant == dtm.FactoredPlant([0.2, 0.07], 0.5, 0.01)
     assert moved.parameters["lag_2"] == 0.07
-    with pytest.raises(ValueError, match="lag_3: no such number"):
+    with pytest.raises(ValueError, match="lag_3: this loop has no such parameter"):
         loop.replace(lag_3=0.1)
 
 
@@ -73,7 +73,7 @@ def test_the_range_of_a_lag_ends_at_zero():
         ({"lags": [0.1], "gain": 0.0}, "gain=0"),
         ({"lags": [0.1], "zero": np.inf}, "zero"),
         ({"zero": 0.1, "integrator": True}, "needs a lag above zero"),
-        ({"pole_frequency": 3.0}, "both or neither"),
+        ({"pole_frequency": 3.0}, "give both or leave both out"),
         ({"pole_frequency": 3.0, "pole_damping": 0.0}, "pole_damping"),
     ],
 )

@@ -80,7 +80,7 @@ def test_a_pure_delay_is_a_plant():
 
 def test_a_plant_with_its_delay_between_command_and_output_has_none_in_its_measurement():
     G = delay(0.25) / (s + 1.0)
-    with pytest.raises(ValueError, match=r"delay_path='measurement': .* delay of 0\.25"):
+    with pytest.raises(ValueError, match=r"delay_path='measurement' .* delay of 0\.25"):
         dtm.ControlLoop(G, dtm.P(1.0), delay_path="measurement")
     loop = dtm.ControlLoop(1.0 / (s + 1.0), dtm.P(1.0), delay=0.25, delay_path="measurement")
     assert loop.delay_path == "measurement"
@@ -162,7 +162,7 @@ def test_such_a_loop_starts_at_rest_under_any_reference():
                            initial_output=2.0 * rest)  # fmt: skip
     step = loop.simulate([0.0, 1.0])
     assert jumped.outputs[1] == pytest.approx(2.0 * rest + step.outputs[1], rel=1e-12)
-    with pytest.raises(ValueError, match="initial_output=1: under the reference 0"):
+    with pytest.raises(ValueError, match="initial_output=1: before the start the reference is 0"):
         loop.simulate([0.0, 1.0], initial_output=1.0, reference_before=0.0)
     assert loop.step_response().info()["overshoot"] > 0.0
 

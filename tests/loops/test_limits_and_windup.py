@@ -299,7 +299,7 @@ def test_what_has_no_meaning_is_refused_with_the_reason():
     assert loop.bounds == (-0.1, 0.3)
     assert loop.parameters["limit_low"] == -0.1
     assert loop.replace(limit_high=0.4).bounds == (-0.1, 0.4)
-    with pytest.raises(ValueError, match="equal limits"):
+    with pytest.raises(ValueError, match="the same limit for positive and negative"):
         _ = -loop.limit
     with pytest.raises(ValueError, match="zero between"):
         loop.replace(limit=(0.1, 0.3))

@@ -155,10 +155,10 @@ def test_bad_numbers_are_named(arguments, message):
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: dtm.Integrator(gain=0.0), "gain=0: a plant without gain"),
+        (lambda: dtm.Integrator(gain=0.0), "gain=0: a plant whose gain is zero"),
         (lambda: dtm.Integrator(lag=-0.1), "lag=-0.1"),
         # It was told that the loop is open without a time constant.
-        (lambda: dtm.FirstOrder(1, 0), "time_constant=0: the plant is then a gain alone"),
+        (lambda: dtm.FirstOrder(1, 0), "time_constant=0: then the plant is only a gain"),
         (lambda: dtm.P(0.0), "Kp=0"),
         (lambda: dtm.PID(0.0, 0.0, 0.0), "Kp=0, Ki=0, Kd=0"),
         (lambda: dtm.P(math.inf), "Kp=inf"),
@@ -204,7 +204,7 @@ def test_a_controller_says_what_it_takes_in_place_of_another_name():
     [
         (lambda loop: loop.simulate([0.0, 1.0, 1.0]), "increasing"),
         (lambda loop: loop.simulate([]), "empty"),
-        (lambda loop: loop.simulate([0.0, math.nan]), "time holds NaN"),
+        (lambda loop: loop.simulate([0.0, math.nan]), "time contains NaN"),
         (lambda loop: loop.simulate([[0.0]]), "one-dimensional"),
         (lambda loop: loop.simulate([0.0], [1.0, 2.0]), "one value for"),
         (lambda loop: loop.simulate([0.0], 1.0, reference_time=[0.0]), "reference_time"),
@@ -217,10 +217,10 @@ def test_a_controller_says_what_it_takes_in_place_of_another_name():
         (lambda loop: loop.replace(delay=None).characteristic(), "delay of this loop is None"),
         (lambda loop: loop.stable_range("limit"), "'limit' is not"),
         (lambda loop: loop.rightmost(0), "n=0"),
-        (lambda loop: loop.replace(Kd=1.0), "Kd: no such number"),
+        (lambda loop: loop.replace(Kd=1.0), "Kd: this loop has no such parameter"),
         (
             lambda loop: loop.replace(sample_time=0.1, Kp=9.0).stable_range("Kp"),
-            "not stable at Kp=9",
+            "at Kp=9",
         ),
         (lambda loop: loop.replace(Kp=50.0).simulate([0.0, 1e4]), "exceeds 1e150"),
         (

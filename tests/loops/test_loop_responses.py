@@ -274,7 +274,7 @@ def test_an_impulse_response_is_the_slope_of_the_step_response(loop, delay_path)
 
 def test_loops_without_an_impulse_response_say_so():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.25)
-    with pytest.raises(ValueError, match="sees no impulse"):
+    with pytest.raises(ValueError, match="does not see an impulse"):
         loop.replace(sample_time=0.1).impulse_response()
     with pytest.raises(ValueError, match=r"limit=1\.0"):
         loop.replace(limit=1.0).impulse_response()

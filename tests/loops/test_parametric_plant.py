@@ -63,10 +63,10 @@ def test_plants_with_the_same_function_and_numbers_are_equal():
         ((drag, {}), ValueError, "give a name and a value"),
         ((drag, {"m": 1.0}), TypeError, r"polynomials\(m\) failed"),
         ((drag, {"m": np.nan, "c": 1.0}), ValueError, "m="),
-        ((drag, {"m": 1.0, "Kp": 1.0}), ValueError, "'Kp' is already used by the loop"),
+        ((drag, {"m": 1.0, "Kp": 1.0}), ValueError, "'Kp' is already a parameter of the loop"),
         ((drag, VALUES, 0.0), ValueError, "gain=0"),
         ((lambda a: ([a, 0.0], [1.0]), {"a": 1.0}), ValueError, "cannot differentiate"),
-        ((lambda a: (a, 1.0, 2.0), {"a": 1.0}), ValueError, "returns two lists"),
+        ((lambda a: (a, 1.0, 2.0), {"a": 1.0}), ValueError, "must return two lists"),
     ],
 )
 def test_what_is_no_plant_is_refused(arguments, error, message):

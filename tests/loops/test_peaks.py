@@ -199,8 +199,8 @@ def test_the_disk_margin_holds_its_gains_and_turns():
 
 def test_of_several_inputs_or_outputs_one_is_chosen():
     system = dtm.DelaySystem({0.3: -np.eye(2)}, {0.3: np.array([[2.0, 0.0], [1.0, 1.0]])})
-    with pytest.raises(ValueError, match="has 2 outputs: choose one by output="):
+    with pytest.raises(ValueError, match="has 2 outputs: choose one of them by output="):
         system.hinf_norm()
-    with pytest.raises(ValueError, match="has 2 inputs: choose one by input="):
+    with pytest.raises(ValueError, match="has 2 inputs: choose one of them by input="):
         system.hinf_norm(output=0)
     assert system.hinf_norm(0, 0) == pytest.approx(2.0 * system.hinf_norm(1, 0))

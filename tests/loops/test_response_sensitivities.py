@@ -248,7 +248,7 @@ def test_outputs_do_not_depend_on_whether_derivatives_are_asked_for():
 @pytest.mark.parametrize(
     ("names", "error", "words"),
     [
-        (("mass",), ValueError, "no number 'mass'"),
+        (("mass",), ValueError, "no parameter 'mass'"),
         ("delay", TypeError, "sequence"),
         (("lag",), ValueError, "lag=0"),
     ],

@@ -365,7 +365,7 @@ def test_the_summary_counts_every_comparison(found):
 
 
 def test_an_unknown_part_is_refused():
-    with pytest.raises(ValueError, match="table9: not one of table1"):
+    with pytest.raises(ValueError, match="table9 cannot be reproduced: give some of table1"):
         paper.reproduce(only=["table9"])
     with pytest.raises(ValueError, match="only is empty"):
         paper.reproduce(only=[])
@@ -447,5 +447,5 @@ def test_the_command_as_json(tmp_path):
 
 def test_the_command_refuses_an_unknown_part(tmp_path):
     said = one_clear_line(run("reproduce", "--only", "figure5", cwd=tmp_path))
-    assert "figure5: not one of" in said
+    assert "figure5 cannot be reproduced" in said
     assert "\n" not in said

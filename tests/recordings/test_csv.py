@@ -70,7 +70,7 @@ def test_names_in_latin_1_and_utf_8_are_found(tmp_path):
 def test_a_table_without_names_is_told_where_they_have_to_be(first, tmp_path):
     path = tmp_path / "run.csv"
     path.write_text(f"# a comment\n{first}\n{first}\n")
-    words = f"the first line holds numbers, {first!r}: add a line with the names of the columns"
+    words = f"contains numbers, {first!r}. Add a line with the names of the columns"
     for names in ({}, NAMES):
         with pytest.raises(dtm.RecordingError, match=re.escape(words)):
             dtm.read_recording(path, **names)
@@ -85,15 +85,17 @@ def test_the_separator_is_the_one_that_finds_the_names(tmp_path):
     renamed = {"t s": 0, "ref, m": 1, "height m": 2}
     table = as_csv(dict(zip(renamed, list(COLUMNS.values())[:3], strict=True)), delimiter=";")
     assert_is_the_table(read(tmp_path, table, time="t s", reference="ref, m", output="height m"))
-    with pytest.raises(dtm.RecordingError, match=r"no column 't s'.* it has 't s;ref', 'm;height"):
+    with pytest.raises(
+        dtm.RecordingError, match=r"no column 't s'.* Its columns are 't s;ref', 'm;height"
+    ):
         read(tmp_path, table, time="t s", reference="ref, m", output="height m", delimiter=",")
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (("\n0.5,", "\n0.5,,"), "line 7: 5 cells under 4 column names"),
-        (("\n0.5,0.0,", "\n0.5,"), "line 7: 3 cells, so the column 'speed' has none"),
+        (("\n0.5,", "\n0.5,,"), "line 7 has 5 cells, but there are 4 column names"),
+        (("\n0.5,0.0,", "\n0.5,"), "line 7 has 3 cells, so the cell of the column 'speed' is"),
         (("\n0.5,0.0,", "\n0.5,0x1p3,"), "line 7: '0x1p3' in column 'ref_m' is not a number"),
         (("\n0.5,0.0,", "\n0.5,1_0,"), "line 7: '1_0' in column 'ref_m' is not a number"),
         (("\n0.5,0.0,", "\n0.5,1e999,"), "line 7: 'ref_m' is inf"),
@@ -101,9 +103,9 @@ def test_the_separator_is_the_one_that_finds_the_names(tmp_path):
         (("\n0.5,0.0,", "\nNaN,0.0,"), "line 7: 't_s' is nan"),
         (("\n0.5,", "\n# gust\n\n0.1,"), "line 9: the time goes back .0.4 is followed by 0.1."),
         (("\n0.5,", "\n0.4,"), "line 7: the time repeats"),
-        (("\n0.5,", "\n0.5\n"), "line 7: 1 cells, so the column 'ref_m' has none"),
+        (("\n0.5,", "\n0.5\n"), "line 7 has 1 cells, so the cell of the column 'ref_m' is missing"),
         (("\n0.5,", '\n0.5,"'), "not a CSV file"),
-        (("\n0.5,0.0,", '\n0.5,"0,0",'), "line 7: '0,0' .* a decimal comma, and line 2 has "),
+        (("\n0.5,0.0,", '\n0.5,"0,0",'), "line 7: '0,0' .* a decimal comma, but line 2 has "),
         (("\n0.5,0.0,", '\n0.5,"1,000,000",'), "line 7: '1,000,000' .* no comma"),
     ],
 )  # fmt: skip
@@ -121,7 +123,9 @@ def test_a_line_that_is_too_long_is_refused_beside_one_that_is_too_short(delimit
     table = table.replace("\n0.5", f"\n0.45{delimiter}0", 1).replace(
         last, last[: last.rindex(delimiter)]
     )
-    with pytest.raises(dtm.RecordingError, match="line 7: 5 cells under 4 column names"):
+    with pytest.raises(
+        dtm.RecordingError, match="line 7 has 5 cells, but there are 4 column names"
+    ):
         read(tmp_path, table)
 
 
@@ -274,7 +278,7 @@ def test_a_separator_may_be_any_character(tmp_path):
         table = as_csv(delimiter="¦").encode(encoding)
         assert_is_the_table(read(tmp_path, table, delimiter="¦"))
     for wrong in ("", ", ", '"', "\n"):
-        with pytest.raises(dtm.RecordingError, match="is not one character, or it is a quote or"):
+        with pytest.raises(dtm.RecordingError, match="give one character, but not a quote or"):
             read(tmp_path, as_csv(), delimiter=wrong)
 
 
@@ -287,7 +291,7 @@ def test_a_comma_that_may_stand_for_thousands_is_refused(tmp_path):
         dtm.RecordingError, match=r"line 3: '1,120' in column 'y' may be 1.12 or 1120"
     ):
         read(tmp_path, "t,r,y\n" + THOUSANDS, **names)
-    with pytest.raises(dtm.RecordingError, match=r"'1,120' .* a decimal comma, and line 2 has"):
+    with pytest.raises(dtm.RecordingError, match=r"'1,120' .* a decimal comma, but line 2 has"):
         read(tmp_path, "t,r,y\n" + THOUSANDS.replace("950", "950.5"), **names)
     # Cells that can be nothing but decimals decide for all.
     for decimal in ('"0,950"', '"1,02"', '"1234,567"', '"1,0201"', '"1,020e0"', '"01,950"'):
@@ -301,7 +305,7 @@ def test_a_comma_that_may_stand_for_thousands_is_refused(tmp_path):
         (gzip.compress(as_csv().encode(), mtime=0)[:-20], "is damaged and cannot be unpacked"),
         (gzip.compress(as_csv().encode(), mtime=0)[:300] + b"\xff" * 90, "cannot be unpacked"),
         (gzip.compress(b"PK\x03\x04" + bytes(99), mtime=0), "is a zip archive"),
-        (gzip.compress(b"PAR1" + bytes(99), mtime=0), "contains no text: unpack the file"),
+        (gzip.compress(b"PAR1" + bytes(99), mtime=0), "does not contain text: unpack the file"),
         (gzip.compress(bytes(99), mtime=0), "neither a text file"),
         (b"\xff\xfe" + as_csv().encode("utf-16")[3:], "neither a text file"),
         (b"time\x07reference", "neither a text file"),
@@ -316,5 +320,5 @@ def test_damaged_files_are_refused(content, words, tmp_path):
 def test_a_file_that_unpacks_to_far_more_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("deadtime.recordings.readers._limits.UNPACKED", 0)
     long = as_csv() + "# a comment\n" * 1_000_000
-    with pytest.raises(dtm.RecordingError, match="but would have more than"):
+    with pytest.raises(dtm.RecordingError, match="but more than"):
         read(tmp_path, gzip.compress(long.encode()))

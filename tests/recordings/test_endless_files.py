@@ -58,7 +58,7 @@ def test_a_pipe_without_end_is_refused_at_the_limit(tmp_path, monkeypatch, reade
 
     writer = threading.Thread(target=write)
     writer.start()
-    with pytest.raises(dtm.RecordingError, match="has more than 3000000 bytes, or no end"):
+    with pytest.raises(dtm.RecordingError, match="has more than 3000000 bytes, or never ends"):
         reader(path)
     writer.join()
 

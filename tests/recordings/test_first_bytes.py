@@ -28,7 +28,7 @@ TLOG = struct.pack(">Q", 1_700_000_000_000_000)
         (b"\x89PNG\r\n\x1a\n", "a PNG picture"),
         (b"%PDF-1.7", "a PDF document"),
         (b"#ROSBAG V2.0\n", "a ROS bag"),
-        (b"\x89HDF\r\n\x1a\n", "an HDF5 file that MATLAB has not written"),
+        (b"\x89HDF\r\n\x1a\n", "an HDF5 file that does not come from MATLAB"),
         (b"SQLite format 3\0", "an SQLite database"),
     ],
 )  # fmt: skip

@@ -109,7 +109,7 @@ def test_an_address_leads_to_its_column(path, addresses):
 @pytest.mark.parametrize(
     ("address", "words"),
     [
-        ("rows", r"no column 'rows' for the output: it has .*; did you mean 'rows\["),
+        ("rows", r"no column 'rows' for the output. Its columns are .*; did you mean 'rows\["),
         ("rows[3]", r"did you mean 'rows\[2\]'"),
         ("log.signals.value[1]", r"did you mean 'log.signals.values\[1\]'"),
         ("name", "no column 'name'"),

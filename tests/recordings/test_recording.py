@@ -106,7 +106,7 @@ def test_a_missing_column_is_named_with_a_similar_one(tmp_path):
 
 def test_two_columns_of_one_name_are_refused(tmp_path):
     path = write(tmp_path, [(*row, 0) for row in ROWS], header="t_s,ref_m,height_m,ref_m")
-    with pytest.raises(dtm.RecordingError, match="2 columns named 'ref_m'"):
+    with pytest.raises(dtm.RecordingError, match="2 columns with the name 'ref_m'"):
         read(path)
 
 
@@ -129,7 +129,7 @@ def test_files_that_are_not_recordings_are_refused(tmp_path, content, words):
 
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
-    with pytest.raises(dtm.RecordingError, match="no file"):
+    with pytest.raises(dtm.RecordingError, match="does not exist"):
         read(tmp_path / "nowhere.csv")
     with pytest.raises(dtm.RecordingError, match="folder"):
         read(tmp_path)
@@ -167,11 +167,11 @@ def make(**change):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"output": np.zeros(9)}, "differ in length"),
-        ({"time": np.zeros(10)}, "repeats at row 1"),
-        ({"time": np.arange(10.0)[::-1]}, "goes back at row 1"),
+        ({"output": np.zeros(9)}, "have different lengths"),
+        ({"time": np.zeros(10)}, "at row 1 the time repeats"),
+        ({"time": np.arange(10.0)[::-1]}, "at row 1 the time goes back"),
         ({"output": [*np.zeros(9), np.inf]}, "inf at row 9"),
-        ({"output": [*np.zeros(7), *[np.nan] * 3]}, "known in 7 of 10 rows, at least 8"),
+        ({"output": [*np.zeros(7), *[np.nan] * 3]}, "known in 7 of 10 rows, but at least 8"),
         ({"time": [*np.arange(9.0), np.nan]}, "time is nan at row 9"),
         ({"command": np.full(10, np.nan)}, "command is nan at row 0"),
         ({"output": np.zeros((10, 1))}, "shape"),

@@ -46,10 +46,10 @@ def test_it_is_saved_bit_for_bit(tmp_path, ending):
     ("sent", "match"),
     [
         (([0.1], [1.0]), "the first command is sent at 0.1 s, after the first row at 0 s"),
-        (([-1.0, -1.0], [1.0, 2.0]), "the time of the commands repeats at row 1"),
+        (([-1.0, -1.0], [1.0, 2.0]), "at row 1 the time of the commands repeats"),
         (([-1.0, 0.0], [1.0]), "1 commands were sent at 2 times"),
         (([-1.0], [np.nan]), "the commands is nan at row 0"),
-        (([], []), "0 samples, at least 1"),
+        (([], []), "0 samples, but at least 1"),
     ],
 )
 def test_what_is_wrong_is_said(sent, match):
@@ -68,7 +68,7 @@ def test_the_sample_time_is_held_against_the_times_of_the_commands():
         return [one.message for one in found.check(loop).findings if one.severity == "refused"]
 
     assert refusals(0.065) == []
-    assert any("100 % of the changes of the command come sooner" in one for one in refusals(0.1))
+    assert any("100 % of the changes of the command follow" in one for one in refusals(0.1))
 
 
 def test_a_command_and_sent_ones_exclude_each_other():

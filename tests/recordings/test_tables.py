@@ -139,15 +139,18 @@ def test_an_infinite_value_is_refused_with_its_row_and_nan_is_missing(kind, valu
         ({"t_s": T[::-1]}, "the table, row 1: the time goes back"),
         ({"t_s": np.where(T[7] == T, T[6], T)}, "the table, row 7: the time repeats"),
         ({"t_s": np.where(T[7] == T, np.nan, T)}, "the table, row 7: 't_s' is nan"),
-        ({"height_m": Y[:-1]}, "differ in length: {'t_s': 60, 'ref_m': 60, 'height_m': 59}"),
+        ({"height_m": Y[:-1]}, "have different lengths: {'t_s': 60, 'ref_m': 60, 'height_m': 59}"),
         ({"height_m": Y[:, None]}, r"column 'height_m' has shape \(60, 1\)"),
-        ({"height_m": Y * 1j}, "'height_m' is not a column of numbers: it holds complex numbers"),
-        ({"height_m": ["1.5"] * 60}, "it holds text"),
-        ({"height_m": [1.5, "1.5"] * 30}, "it holds text"),
+        (
+            {"height_m": Y * 1j},
+            "'height_m' is not a column of numbers: it contains complex numbers",
+        ),
+        ({"height_m": ["1.5"] * 60}, "it contains text"),
+        ({"height_m": [1.5, "1.5"] * 30}, "it contains text"),
         ({"height_m": [{}] * 60}, "is not a column of numbers"),
         ({"height_m": Y * 1e200}, "another unit"),
         ({"ref_m": np.ones(60)}, "the reference 'ref_m' is 1 throughout"),
-        ({name: values[:5] for name, values in COLUMNS.items()}, "5 samples, at least 8"),
+        ({name: values[:5] for name, values in COLUMNS.items()}, "5 samples, but at least 8"),
     ],
 )
 def test_a_bad_table_is_refused(change, words):
@@ -157,7 +160,7 @@ def test_a_bad_table_is_refused(change, words):
 
 def test_two_columns_of_one_name_are_refused():
     frame = pytest.importorskip("pandas").DataFrame(COLUMNS).rename(columns={"speed": "ref_m"})
-    with pytest.raises(dtm.RecordingError, match="2 columns named 'ref_m'"):
+    with pytest.raises(dtm.RecordingError, match="2 columns with the name 'ref_m'"):
         dtm.read_recording(frame, **NAMES)
 
 

@@ -169,7 +169,7 @@ def test_counts_step_by_the_directions_of_gains(fixed, varied, early, late):
     try:
         found = dtm.crossings(family, {"K": (-4.0, 4.0)})
     except ValueError as error:
-        if "stays" not in str(error) and "beyond double" not in str(error):
+        if "stays" not in str(error) and "double precision cannot find" not in str(error):
             raise
         return
     if (np.diff(found.values) > 1e-6).all() and (found.direction != 0).all():
@@ -210,19 +210,19 @@ def test_results_do_not_change_and_survive_pickling():
 
 
 REFUSED = [
-    (s + K * delay(1.0), {"Kp": (0, 1)}, None, "Kp: no such parameter"),
+    (s + K * delay(1.0), {"Kp": (0, 1)}, None, "Kp is not a parameter"),
     (s + K * delay(T), {"K": (0, 1)}, None, "T has no value"),
-    (s + K * delay(T), {"K": (0, 1)}, {"K": 1.0, "T": 1.0}, "has both a range and the value"),
+    (s + K * delay(T), {"K": (0, 1)}, {"K": 1.0, "T": 1.0}, "has a range, and also a value"),
     (s + K * delay(1.0), {"K": (1, 1)}, None, "below its high end"),
-    (s + K * delay(1.0), {}, None, "crossings need exactly one"),
+    (s + K * delay(1.0), {}, None, "crossings need a range of exactly one"),
     (s + T * delay(T), {"T": (0, 1)}, None, "both a factor and a delay"),
     (s + K**2 * delay(1.0), {"K": (0, 1)}, None, "only as a factor"),
     (s + delay(T) + delay(7 * T), {"T": (0, 1)}, None, "several delays"),
     (s + 1.0 + 2.0 * s * delay(T), {"T": (0, 1)}, None, "chains"),
     (s * delay(T) + 1.0, {"T": (0, 1)}, None, "not causal"),
     (s + Kp * s * delay(0.3) + 1.0, {"Kp": (1, 2)}, None, "chains"),
-    (s * (s + K * delay(1.0)), {"K": (0, 1)}, None, "stays at s = 0"),
-    (s - 1.0 + delay(T), {"T": (0, 2)}, None, "stays at s = 0"),
+    (s * (s + K * delay(1.0)), {"K": (0, 1)}, None, "stays at s = 0 for all values"),
+    (s - 1.0 + delay(T), {"T": (0, 2)}, None, "stays at s = 0 for all values"),
     ((s**2 + 1.0) * (s + delay(T)), {"T": (0, 2)}, None, "stays at omega = 1 "),
     (s + delay(T), {"T": (-1, 2)}, None, "delays must not be negative"),
     (s + delay(1.0 - T), {"T": (0, 2)}, None, "a delay is -1 s at T=2"),
@@ -236,7 +236,7 @@ def test_what_is_not_covered_is_refused(family, ranges, at, told):
 
 
 def test_wrong_types_are_refused():
-    with pytest.raises(TypeError, match="family of type int"):
+    with pytest.raises(TypeError, match="family is of type int"):
         dtm.crossings(3, {"K": (0, 1)})
     with pytest.raises(TypeError, match="give a dict"):
         dtm.crossings(s + K, ("K", 0, 1))
@@ -245,7 +245,7 @@ def test_wrong_types_are_refused():
     sampled = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36, sample_time=0.065)
     with pytest.raises(ValueError, match=r"sample_time=0\.065"):
         dtm.crossings(sampled, {"Kp": (0, 1)})
-    with pytest.raises(ValueError, match="does not depend on such a number"):
+    with pytest.raises(ValueError, match="does not depend on this parameter"):
         dtm.crossings(sampled.continuous(), {"Kd": (0, 1)})
 
 
@@ -290,11 +290,11 @@ def test_an_unstable_loop_has_no_delay_margin():
     ):
         with pytest.raises(ValueError, match="not stable"):
             dtm.delay_margin(loop, at=at)
-    with pytest.raises(ValueError, match="parameters are delays"):
+    with pytest.raises(ValueError, match="exactly one delay as a parameter"):
         dtm.delay_margin(s + K, at={"K": 1.0})
-    with pytest.raises(TypeError, match="already has its parameters"):
+    with pytest.raises(TypeError, match="have values already"):
         dtm.delay_margin(unstable, at={"Kp": 1.0})
-    with pytest.raises(TypeError, match="loop of type float"):
+    with pytest.raises(TypeError, match="loop is of type float"):
         dtm.delay_margin(1.0)
 
 

@@ -395,7 +395,7 @@ def test_what_cannot_be_answered_is_refused(make, ask, message):
 
 def test_a_root_on_the_edge_is_reported():
     system = DelaySystem(np.diag(np.arange(1.0, 13.0)))
-    with pytest.raises(dtm.ContourError, match="meets 3"):
+    with pytest.raises(dtm.ContourError, match="touches 3"):
         system.count(re=(3, 5.5), im=(-1, 1.5))
     for re, im in [((1, 0), None), ((math.nan, 1), None), (None, (2, 2))]:
         with pytest.raises(ValueError, match="range"):

@@ -69,7 +69,7 @@ def test_delays_are_affine_in_the_parameters():
     h = 1 + delay(2 * T + 0.1) * delay(Kp)
     np.testing.assert_array_equal(h.at(T=0.25, Kp=1.0).delays, [0.0, 1.6])
     for bad in (T * Kp, T**2, s * T, T * delay(0.1), T + s):
-        with pytest.raises(ValueError, match="sum of multiples"):
+        with pytest.raises(ValueError, match="sum of parameters"):
             delay(bad)
 
 

@@ -42,7 +42,7 @@ def test_count_of_the_upper_half(name):
 def test_roots_on_the_edge_are_classified(name):
     h, where = make(CASES[name]), symmetric(CASES[name])
     for method in (h.count, h.roots):
-        with pytest.raises(ContourError, match="the edge of the region meets") as error:
+        with pytest.raises(ContourError, match="the edge of the region touches") as error:
             method(**where)
         assert error.value.inside == 0
         for (center, radius, multiplicity), root in zip(

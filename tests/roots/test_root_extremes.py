@@ -207,15 +207,15 @@ ONE_DELAY = s + delay(1.0)
 @pytest.mark.parametrize(
     ("ask", "words"),
     [
-        (lambda: QuasiPolynomial([[0.0, math.nan]], [0.0]), "coefficient NaN.*finite"),
-        (lambda: QuasiPolynomial([[-math.inf, 1.0]], [0.0]), "coefficient -inf.*finite"),
-        (lambda: QuasiPolynomial([[1.0]], [math.inf]), "delay inf.*finite"),
-        (lambda: QuasiPolynomial([[1.0]], [-1e-300]), "delay -.*not negative"),
-        (lambda: QuasiPolynomial([], []), "shape.*none empty"),
-        (lambda: QuasiPolynomial([[]], [0.0]), "shape.*none empty"),
+        (lambda: QuasiPolynomial([[0.0, math.nan]], [0.0]), "coefficient is NaN.*finite"),
+        (lambda: QuasiPolynomial([[-math.inf, 1.0]], [0.0]), "coefficient is -inf.*finite"),
+        (lambda: QuasiPolynomial([[1.0]], [math.inf]), "delay is inf.*finite"),
+        (lambda: QuasiPolynomial([[1.0]], [-1e-300]), "delay is -.*not negative"),
+        (lambda: QuasiPolynomial([], []), "shape.*not empty"),
+        (lambda: QuasiPolynomial([[]], [0.0]), "shape.*not empty"),
         (lambda: QuasiPolynomial([[1.0], [1.0, 2.0]], [0.0, 1.0]), "different lengths.*zeros"),
-        (lambda: QuasiPolynomial([[1.0, 2.0]], [0.0, 1.0]), "1 rows.*2 delays.*every row"),
-        (lambda: QuasiPolynomial([[1.0, 2.0]], 0.0), "delays of shape"),
+        (lambda: QuasiPolynomial([[1.0, 2.0]], [0.0, 1.0]), "1 rows.*2 delays.*each row"),
+        (lambda: QuasiPolynomial([[1.0, 2.0]], 0.0), "delays has shape"),
         (lambda: QuasiPolynomial([[1j]], [0.0]), "complex128.*real"),
         (lambda: QuasiPolynomial([["1"]], [0.0]), "real numbers"),
         (lambda: QuasiPolynomial(None, None), "real numbers"),
@@ -223,10 +223,10 @@ ONE_DELAY = s + delay(1.0)
         (lambda: ONE_DELAY.roots(re=(-1, 1), im=(2, 2)), r"im=\(2, 2\).*below"),
         (lambda: ONE_DELAY.roots(re=(-1, 1), im=(3, -3)), r"im=\(3, -3\).*below"),
         (lambda: ONE_DELAY.roots(), "infinitely many.*both ends of im"),
-        (lambda: (s - s).roots(re=(-1, 1), im=(-1, 1)), "zero function.*every s"),
-        (lambda: (s - s).is_stable(), "zero function.*every s"),
+        (lambda: (s - s).roots(re=(-1, 1), im=(-1, 1)), "zero everywhere"),
+        (lambda: (s - s).is_stable(), "zero everywhere"),
         (lambda: (1 + s * delay(1.0)).roots(), "advanced.*both ends of im"),
-        (lambda: (1 + s * delay(1.0)).rightmost(), "advanced.*not be delayed"),
+        (lambda: (1 + s * delay(1.0)).rightmost(), "advanced.*longer delay"),
     ],
 )
 def test_bad_input_is_refused_by_value(ask, words):
@@ -263,7 +263,7 @@ def test_a_refusal_names_the_root_on_the_edge(root, edge):
 
 def ask_where(h, box, side, index):
     """The place of a refused count; counts with the edge moved to either side differ by one."""
-    with pytest.raises(ContourError, match="move the edge") as error:
+    with pytest.raises(ContourError, match="Move the edge") as error:
         h.count(**box)
     counts = []
     for sign in (2, -2):
@@ -280,7 +280,7 @@ def ask_where(h, box, side, index):
 def test_results_beyond_the_range_of_doubles_are_refused(a, b):
     """The rightmost root or the reason for a refusal, without a warning."""
     h = QuasiPolynomial([[0.0, a], [b, 0.0]], [0.0, 1.0])
-    words = "range of double precision|infinitely many|evaluations|rightmost root was not found"
+    words = "exceeds double precision|infinitely many|evaluations|rightmost root was not found"
     roots = []
     with contextlib.suppress(ValueError):
         roots = list(h.rightmost())

@@ -181,7 +181,7 @@ def test_open_ends():
         (s + delay(1.0), {"re": (None, 0)}, "infinitely many"),
         (s + (1 + 0.5 * s) * delay(1.0), {"re": (-1, None)}, "chain"),
         (1 + s * delay(1.0), {"re": (0, None)}, "advanced"),
-        (s - s, {"re": (0, 1), "im": (0, 1)}, "zero function"),
+        (s - s, {"re": (0, 1), "im": (0, 1)}, "zero everywhere"),
         (s, {"re": (1, 0)}, "below its upper end"),
         (s, {"re": (1, 1)}, "below its upper end"),
         (s, {"im": (math.nan, 1)}, "below its upper end"),
@@ -262,7 +262,7 @@ def test_invalid_arguments_are_refused():
         (1 + s * delay(1.0)).rightmost()
     assert (1 + s * delay(1.0)).spectral_abscissa() == math.inf
     assert not (1 + s * delay(1.0)).is_stable()
-    with pytest.raises(ValueError, match="zero function"):
+    with pytest.raises(ValueError, match="zero everywhere"):
         (s - s).rightmost()
     with pytest.raises(ValueError, match="no roots"):
         (s - s + 3).spectral_abscissa()

@@ -125,14 +125,14 @@ def test_lower_roots_are_the_mirror_image():
     ],
 )
 def test_a_multiple_root_is_refused_with_its_multiplicity(h, root, many):
-    with pytest.raises(ValueError, match=f"not simple: {many} roots"):
+    with pytest.raises(ValueError, match=f"not simple: .*separate {many} roots"):
         h.root_sensitivity(root)
 
 
 def test_what_is_no_root_is_refused():
     h = s + 2.0 * delay(0.36)
     for place in (1.0, 100j, -1.5):
-        with pytest.raises(ValueError, match="no root"):
+        with pytest.raises(ValueError, match="not a root"):
             h.root_sensitivity(place)
     with pytest.raises(ValueError, match="finite"):
         h.root_sensitivity(math.nan)

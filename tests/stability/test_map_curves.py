@@ -235,7 +235,7 @@ def test_pickled_maps_keep_their_boundaries():
         ({"damping": 0.5}, TypeError, "ratio"),
         ({"damping": (1.5, 3.0)}, ValueError, "between 0 and 1"),
         ({"damping": (0.5, -1.0)}, ValueError, "horizon"),
-        ({"damping": (0.5, 1.0), "decay": 2.0}, ValueError, "beyond the decay"),
+        ({"damping": (0.5, 1.0), "decay": 2.0}, ValueError, "above the decay"),
     ],
 )
 def test_invalid_requirements_are_refused(options, error, word):

@@ -123,7 +123,7 @@ def test_a_kilohertz_loop_tends_to_the_continuous_one():
 def test_more_states_than_a_map_takes_are_refused():
     plant = dtm.RationalPlant([1.0], np.poly(-np.linspace(1.0, 5.0, 25)))
     loop = dtm.ControlLoop(plant, dtm.P(1.0), delay=0.1, sample_time=0.1)
-    with pytest.raises(ValueError, match="up to 24"):
+    with pytest.raises(ValueError, match="at most 24"):
         dtm.stability_map(loop, {"Kp": (0.0, 1.0), "delay": (0.0, 1.0)}, (3, 3))
 
 

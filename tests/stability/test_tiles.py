@@ -87,5 +87,5 @@ def test_tiles_that_make_no_sense_are_refused():
         tiles(FAMILY, RANGES, (3, 3), (0, 3))
     with pytest.raises(TypeError, match="two whole numbers"):
         tiles(FAMILY, RANGES, (3.5, 3))
-    with pytest.raises(IndexError, match="there are 1 by 1"):
+    with pytest.raises(IndexError, match="the map has 1 by 1"):
         tiles(FAMILY, RANGES, (3, 3))[1, 0]

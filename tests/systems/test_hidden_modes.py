@@ -220,7 +220,7 @@ def test_minreal_keeps_what_does_not_divide_exactly():
 def test_a_response_that_rounding_hides_is_refused():
     Z = (1 - math.exp(0.5) * delay(0.5)) / (s - 1)
     assert Z.step_response([0, 5.0]).outputs[-1] == pytest.approx(math.exp(0.5) - 1, abs=1e-12)
-    with pytest.raises(ValueError, match="hides the output before the end of this run of 60 s"):
+    with pytest.raises(ValueError, match="hide the output before the end of this run of 60 s"):
         Z.step_response([0, 60.0])
     T = predicted(1.0, 0.5, 2.0)[0]
     assert T.step_response([0, 60.0]).outputs[-1] == pytest.approx(2.0, rel=1e-12)

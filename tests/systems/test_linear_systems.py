@@ -442,14 +442,24 @@ TWO = dtm.DelaySystem({0.5: -np.eye(2)}, np.eye(2))
 @pytest.mark.parametrize(
     ("system", "time", "arguments", "message"),
     [
-        (ONE, [0.0, 2.0, 1.0], {}, r"time\[2\]=1.0 does not come after time\[1\]=2.0"),
+        (ONE, [0.0, 2.0, 1.0], {}, r"time\[2\]=1.0 is not later than time\[1\]=2.0"),
         (ONE, [], {}, "time is empty"),
-        (ONE, [0.0, math.nan], {}, "time holds nan"),
+        (ONE, [0.0, math.nan], {}, "time contains nan"),
         (ONE, [0.0, 1.0, 2.0], {"inputs": [1.0, math.nan, 0.0]}, "inputs at t = 1.0 s is nan"),
-        (ONE, [0.0, 1.0, 2.0], {"inputs": [1.0, 0.0]}, r"inputs has shape \(2,\), not \(3,\)"),
-        (TWO, [0.0, 1.0], {"inputs": np.ones((3, 2))}, r"shape \(3, 2\), not \(2, 2\)"),
-        (TWO, [0.0, 1.0], {"inputs": 1.0}, r"inputs has shape \(\), not \(2,\)"),
-        (TWO, [0.0, 1.0], {"inputs": [1, 0], "history": [1.0]}, r"history has shape \(1,\), not"),
+        (
+            ONE,
+            [0.0, 1.0, 2.0],
+            {"inputs": [1.0, 0.0]},
+            r"inputs has shape \(2,\), but it must have shape \(3,\)",
+        ),
+        (
+            TWO,
+            [0.0, 1.0],
+            {"inputs": np.ones((3, 2))},
+            r"shape \(3, 2\), but it must have shape \(2, 2\)",
+        ),
+        (TWO, [0.0, 1.0], {"inputs": 1.0}, r"inputs has shape \(\), but it must have shape \(2,\)"),
+        (TWO, [0.0, 1.0], {"inputs": [1, 0], "history": [1.0]}, r"history has shape \(1,\), but"),
         (TWO, [0.0, 1.0], {"inputs": [1, 0], "initial_state": 1.0}, "initial_state has shape"),
         (ONE, [0.0, 1.0], {"history": lambda t: math.nan}, r"history x\(t\) at t = 0.0 s is nan"),
         (
@@ -462,12 +472,17 @@ TWO = dtm.DelaySystem({0.5: -np.eye(2)}, np.eye(2))
             ONE,
             [0.0, 1.0],
             {"inputs": lambda t: abs(t - 0.3)},
-            r"not smooth at t = 0.3\d* s: name the time in input_breaks",
+            r"not smooth at t = 0.3\d* s: give this time in input_breaks",
         ),
         (ONE, [0.0, 1.0], {"interpolation": "cubic"}, "interpolation='cubic'"),
         (dtm.DelaySystem(3.0, 1.0), [0.0, 200.0], {}, r"exceeds 1e150 at t = \d+"),
         (dtm.DelaySystem({1e-9: -1.0}, 1.0), [0.0, 1.0], {}, "more than 20000000 elements"),
-        (dtm.DelaySystem(np.eye(2), E=np.diag([1, 0])), [0, 1.0], {}, "rank 1 of 2.*algebraic"),
+        (
+            dtm.DelaySystem(np.eye(2), E=np.diag([1, 0])),
+            [0, 1.0],
+            {},
+            "rank 1 but 2 rows.*algebraic",
+        ),
         (
             dtm.DelaySystem(np.eye(2), E=np.diag([1, 0]), N={1.0: np.eye(2)}),
             [0, 1.0],
@@ -494,5 +509,5 @@ def test_the_page_on_simulation_runs():
 
 
 def test_a_transfer_function_has_no_state_to_start_from():
-    with pytest.raises(TypeError, match="does not describe the state"):
+    with pytest.raises(TypeError, match="has no state"):
         (1.0 / (dtm.s + 1.0)).simulate([0.0, 1.0], initial_state=1.0)

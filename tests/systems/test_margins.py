@@ -176,7 +176,7 @@ def test_neutral_loops_lose_strong_stability():
     ("G", "message"),
     [
         (TransferFunction(s * delay(0.1)), "grows with frequency"),
-        (1 / (s * delay(0.5)), "before it comes"),
+        (1 / (s * delay(0.5)), "not causal"),
         (1 / (1 + s * delay(0.5)), "not causal"),
     ],
 )

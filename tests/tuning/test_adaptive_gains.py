@@ -98,7 +98,7 @@ def test_schedule_says_what_it_holds():
     assert schedule.robust.gains["Kp"] == pytest.approx(schedule.proof.Kp)
     assert schedule.proof.gain == (0.8, 1.0)
     assert schedule.proof.decay == 0.2
-    for words in ("0 to 0.5 s", "gain of the plant of 0.8 to 1", "e^(-0.2 t)", "limit of 1"):
+    for words in ("0 to 0.5 s", "gain of the plant is 0.8 to 1", "e^(-0.2 t)", "limit of 1"):
         assert words in schedule.summary()
     assert stages[0] == "designing the robust gains"
     # Each set has at the longest delay of its own the margin of the robust one.

@@ -424,7 +424,7 @@ def test_metrics_are_those_of_the_worst_scenario():
         ({"controller": "PV"}, TypeError, "not a controller"),
         ({"delay": (0.4, 0.3)}, ValueError, "low end"),
         ({"delay": -0.1}, ValueError, "delay"),
-        ({"gain": (-1.0, 1.0)}, ValueError, "one side of zero"),
+        ({"gain": (-1.0, 1.0)}, ValueError, "both positive"),
         ({"objective": "beauty"}, ValueError, "beauty"),
         ({"ranges": {"Kp": (0, 1)}}, ValueError, "gains are"),
         ({"ranges": {"Kp": (1, 1), "Kv": (0, 1)}}, ValueError, "low end"),

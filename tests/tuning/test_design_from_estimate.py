@@ -135,12 +135,12 @@ def test_what_has_no_region_is_refused(fit):
         with pytest.raises(ValueError, match="leave delay= and gain= out"):
             dtm.design(fit, objective="abscissa", **more)
     unsure = dtm.estimate_delay(FLIGHT, KNOWN, method="gcc", free=("delay",))
-    with pytest.raises(ValueError, match=r"the estimate has no region: the gcc method"):
+    with pytest.raises(ValueError, match=r"the estimate has no confidence region: the gcc method"):
         dtm.design(unsure, objective="abscissa")
     with pytest.raises(ValueError, match=r"level=1\.5"):
         dtm.design(fit, level=1.5, objective="abscissa")
     weak = replace(fit, stderr={**fit.stderr, "gain": 1.0}, _profile=None)
-    with pytest.raises(ValueError, match=r"region of the gain, .* contains zero"):
+    with pytest.raises(ValueError, match=r"the gain may be zero"):
         dtm.design(weak, objective="abscissa")
 
 

@@ -224,11 +224,11 @@ REFUSED = [
     (dtm.PD(82.0, 0.9, dtm.DerivativeFilter(200.0, 0.5)), "betaflight", "roll rate", "PT1"),
     (dtm.PID(1.0, 1.0, 1.0), "series", "", "Ti >= 4 Td"),
     (dtm.P(-1.0), "px4", "altitude", "positive"),
-    (dtm.P(1e6), "betaflight", "roll rate", "whole numbers"),
-    (dtm.PI(82.0, 1.0), "betaflight", "roll rate", "rounds to zero"),
+    (dtm.P(1e6), "betaflight", "roll rate", "whole number"),
+    (dtm.PI(82.0, 1.0), "betaflight", "roll rate", "rounded to zero"),
     (dtm.P(1.0), "betaflight", "altitude", "the loops of betaflight"),
-    (dtm.P(1.0), "ideal", "altitude", "no vehicle"),
-    (dtm.P(1.0), "inav", "altitude", "is not one of"),
+    (dtm.P(1.0), "ideal", "altitude", "does not belong to a vehicle"),
+    (dtm.P(1.0), "inav", "altitude", "form='inav': give one of"),
 ]
 
 
@@ -244,11 +244,11 @@ UNREADABLE = [
     ("set p_roll = 45\nset d_roll = 40\nset d_min_roll = 30", "betaflight", "roll rate", "moves"),
     ("set p_roll = many", "betaflight", "roll rate", "give a number"),
     ("Kc = 1\nTx = 3", "ideal", "", "not a parameter of the form"),
-    ("Kc = 1.2\nTi = 40,5", "ideal", "", "Ti = 40,5: give one number a line"),
+    ("Kc = 1.2\nTi = 40,5", "ideal", "", "Ti = 40,5: give one number in each line"),
     ("Kc = 1.2\nTi = 2 min", "ideal", "", "times in seconds"),
-    ("Kc=2 Ti=10", "series", "", "one number a line"),
+    ("Kc=2 Ti=10", "series", "", "one number in each line"),
     ("Kc = 2\nb = 0.5", "ideal", "", "a P has no b"),
-    ("Kc = 2\nTi = 4 %", "ideal", "", "Ti is not in %"),
+    ("Kc = 2\nTi = 4 %", "ideal", "", "give Ti in another unit"),
 ]
 
 
@@ -263,19 +263,19 @@ def test_lines_of_a_faceplate_are_read_with_their_units():
     assert controller_of(text, "ideal") == dtm.PI(1.2, 0.03, weight=0.5)
     assert controller_of("Kc: 2\nTi: off", "ideal") == dtm.P(2.0)
     assert "-0" not in " ".join(settings_of(dtm.PI(-1.0, -0.1), "ideal").lines)
-    with pytest.raises(ValueError, match="that of no vehicle; leave version out"):
+    with pytest.raises(ValueError, match=r"does not belong to a vehicle\. Leave version out"):
         settings_of(dtm.P(1.0), "ideal", version="4.7")
 
 
 def test_notes_say_what_the_firmware_does_otherwise():
     px4 = settings_of(dtm.PID(0.15, 0.2, 0.003), "px4", loop="roll rate")
-    assert any("no kick" in note for note in px4.notes)
-    assert any("without a filter" in note for note in px4.notes)
+    assert any("does not respond to a step of the set point" in note for note in px4.notes)
+    assert any("no filter of the derivative" in note for note in px4.notes)
     outside = settings_of(dtm.P(9.0), "ardupilot", loop="altitude")
-    assert any("outside of 1 to 3" in note for note in outside.notes)
+    assert any("outside of the usual range" in note for note in outside.notes)
     coarse = settings_of(dtm.P(3.0), "betaflight", loop="roll rate")
     assert coarse.rounding > 0.2
-    assert any("coarse" in note for note in coarse.notes)
+    assert any("only whole numbers" in note for note in coarse.notes)
 
 
 def test_the_head_of_a_blackbox_log_is_read():

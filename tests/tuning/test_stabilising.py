@@ -182,7 +182,9 @@ def test_random_plants_gain_by_gain(seed):
 
 def test_a_transfer_function_is_no_loop_and_is_told_what_is():
     # It raised AttributeError.
-    with pytest.raises(TypeError, match=r"TransferFunction is no ControlLoop.*ControlLoop\(plant"):
+    with pytest.raises(
+        TypeError, match=r"TransferFunction is not a ControlLoop.*ControlLoop\(plant"
+    ):
         dtm.sweep(2.0 / dtm.s * dtm.delay(0.3), {"K": 1})
 
 

@@ -146,7 +146,7 @@ def test_an_integrating_process_has_gains_of_its_sign(sign):
     truth = dtm.ControlLoop(dtm.Integrator(0.5 * sign), found.controller, delay=0.95)
     assert truth.is_stable()
     assert truth.margin().max_sensitivity < 1.7
-    assert any("direct acting" in note for note in found.settings.notes) == (sign < 0.0)
+    assert any("direct action" in note for note in found.settings.notes) == (sign < 0.0)
 
 
 def test_a_closed_loop_is_drawn_under_its_own_set_point():

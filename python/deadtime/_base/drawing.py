@@ -67,9 +67,12 @@ def shown_rows(ax: Sequence[Axes] | None, rows: int) -> Sequence[Axes]:
         try:
             given = len(ax)
         except TypeError as error:
-            raise TypeError(f"ax={ax!r}: give a sequence of {rows} axes") from error
+            raise TypeError(f"ax={ax!r}: give a sequence of {rows} matplotlib axes") from error
         if given != rows:
-            raise ValueError(f"ax has {given} axes: give {rows}")
+            raise ValueError(
+                f"ax has {given} matplotlib axes, but this picture has {rows} panels: give "
+                f"{rows} axes"
+            )
         return ax
     check_matplotlib()
     from matplotlib import pyplot

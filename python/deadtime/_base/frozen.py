@@ -16,7 +16,7 @@ class FrozenDict(dict[Any, Any]):
 
     def _refuse(self, *_: Any, **__: Any) -> NoReturn:
         raise TypeError(
-            "this dict belongs to a result and cannot be changed: change a copy of it, dict(...)"
+            "a dict of a result cannot be changed: make a copy with dict(...), and change the copy"
         )
 
     __setitem__ = __delitem__ = __ior__ = _refuse
@@ -33,12 +33,13 @@ class Immutable:
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(
-            f"a {type(self).__name__} cannot be changed: its {name!r} cannot be set"
+            f"a {type(self).__name__} cannot be changed, so its attribute {name!r} cannot be set"
         )
 
     def __delattr__(self, name: str) -> None:
         raise AttributeError(
-            f"a {type(self).__name__} cannot be changed: its {name!r} cannot be deleted"
+            f"a {type(self).__name__} cannot be changed, so its attribute {name!r} cannot be "
+            "deleted"
         )
 
 

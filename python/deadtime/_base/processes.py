@@ -68,8 +68,8 @@ def _elsewhere(
                 report(done)
     except BrokenProcessPool as error:
         raise WorkerError(
-            "the worker processes could not start, or were killed: in a script, put the code "
-            'under `if __name__ == "__main__":`, or give processes=1'
+            "the worker processes could not start, or were killed. In a script, put the code "
+            'under `if __name__ == "__main__":`. Or give processes=1'
         ) from error
     finally:
         pool.shutdown(wait=True, cancel_futures=True)

@@ -44,7 +44,9 @@ def finite(name: str, value: SupportsFloat) -> float:
     except (TypeError, ValueError) as error:
         raise TypeError(f"{name}={value!r} is not a number: give a real number") from error
     except OverflowError as error:  # a whole number beyond the range of doubles
-        raise ValueError(f"{name} is beyond 1e308: give a smaller number") from error
+        raise ValueError(
+            f"{name} is beyond 1e308, the largest number in double precision: give a smaller number"
+        ) from error
     if not math.isfinite(number):
         raise ValueError(f"{name}={number}: give a finite number")
     return number
@@ -86,7 +88,7 @@ def unmasked(name: str, values: Any) -> Any:
         if masked.size or values is np.ma.masked:
             where = f"[{', '.join(map(str, masked[0]))}]" if values.ndim else ""
             raise ValueError(
-                f"{name}{where} is masked, so it has no value: leave masked entries out, or "
+                f"{name}{where} is masked, so its value is missing: leave masked entries out, or "
                 "fill them"
             )
         return values.data
@@ -109,7 +111,7 @@ def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
             f"{name} has rows of different lengths: give rows of one length"
         ) from error
     if array.size and array.dtype.kind not in "biuf":
-        raise TypeError(f"{name} of dtype {array.dtype}: give real numbers")
+        raise TypeError(f"{name} has the dtype {array.dtype}: give real numbers")
     return array.astype(np.float64, copy=False)
 
 
@@ -148,12 +150,12 @@ def increasing(name: str, given: ArrayLike) -> NDArray[np.float64]:
     """Return `given` as a vector of finite times that increase, or raise."""
     times = one_dimensional(name, given)
     if not np.isfinite(times).all():
-        raise ValueError(f"{name} holds {times[~np.isfinite(times)][0]}: give finite times")
+        raise ValueError(f"{name} contains {times[~np.isfinite(times)][0]}: give finite times")
     steps = np.diff(times)
     if (steps <= 0.0).any():
         at = int(np.argmax(steps <= 0.0))
         raise ValueError(
-            f"{name}[{at + 1}]={times[at + 1]} does not come after {name}[{at}]={times[at]}: give "
+            f"{name}[{at + 1}]={times[at + 1]} is not later than {name}[{at}]={times[at]}: give "
             "increasing times"
         )
     return times
@@ -189,7 +191,8 @@ def interval(name: str, given: Any, *, may_be_point: bool = False) -> Range:
     low, high, count = _ends_of(name, given)
     if count is not None:
         raise ValueError(
-            f"{name}={given!r}: this argument is a range without points, so give (low, high)"
+            f"{name}={given!r}: here only the two ends of the range are possible, so give "
+            "(low, high)"
         )
     return _increasing(name, given, low, high, may_be_point)
 
@@ -202,7 +205,7 @@ def open_interval(name: str, given: Any) -> Range:
     if isinstance(given, np.ndarray):
         given = given.tolist()
     if not is_range(given) or len(given) != 2 or any(isinstance(one, str) for one in given):
-        raise TypeError(f"{name}={given!r}: give a range (low, high), with None if an end is open")
+        raise TypeError(f"{name}={given!r}: give a range (low, high). For an open end, give None")
     try:
         low, high = (
             default if end is None else float(end)
@@ -210,7 +213,7 @@ def open_interval(name: str, given: Any) -> Range:
         )
     except (TypeError, ValueError) as error:
         raise TypeError(
-            f"{name}={given!r}: give a range (low, high), with None if an end is open"
+            f"{name}={given!r}: give a range (low, high). For an open end, give None"
         ) from error
     return low, high
 
@@ -242,18 +245,20 @@ def points_of(name: str, given: Any, size: int) -> NDArray[np.float64]:
     """Return the points of an axis: those of a range, or the given ones, increasing and finite."""
     if not isinstance(given, (tuple, list, np.ndarray)) and np.ndim(given) == 0:
         raise TypeError(
-            f"{name}={given!r}: give a range (low, high), or points as an array. Give a "
-            "parameter that has one value in at={...}"
+            f"{name}={given!r}: give a range (low, high), or points as an array. If the parameter "
+            "has only one value, give this value in at={...}"
         )
     points = given_points(name, given, size)
     if points.ndim != 1 or points.size == 0:
         raise ValueError(
-            f"{name} of shape {points.shape}: give a one-dimensional array with at least one point"
+            f"{name} has shape {points.shape}: give a one-dimensional array with at least one point"
         )
     if not np.isfinite(points).all():
-        raise ValueError(f"{name}: a point is not finite; give finite numbers")
+        raise ValueError(f"{name} contains a point that is not finite: give finite numbers")
     if not (np.diff(points) > 0.0).all():
-        raise ValueError(f"{name}: the points do not increase; sort them and remove repeated ones")
+        raise ValueError(
+            f"the points of {name} do not increase: sort the points, and remove repeated ones"
+        )
     return points
 
 
@@ -274,8 +279,8 @@ def numbers_at(at: Mapping[str, SupportsFloat] | None, varied: Any = ()) -> dict
     for name in at:
         if name in varied:
             raise ValueError(
-                f"{name} has both a range and the value at={{{name!r}: {at[name]!r}}}: give "
-                "only one of them"
+                f"{name} has a range, and also a value in at={{{name!r}: {at[name]!r}}}: give "
+                "only the range or only the value"
             )
     return {name: finite(name, value) for name, value in at.items()}
 
@@ -294,17 +299,20 @@ def _ends_of(name: str, given: Any) -> tuple[float, float, int | None]:
         count = operator.index(given[2])
     except TypeError as error:
         raise TypeError(
-            f"{name}={given!r}: three entries mean a range (low, high, n), whose n is a whole "
-            "number. For three points, give an array, numpy.array([...])"
+            f"{name}={given!r}: three entries mean a range (low, high, n) of n points, so the "
+            "third entry must be a whole number. For three points, give numpy.array([...])"
         ) from error
     if count < 2:
-        raise ValueError(f"{name}={given!r}: a range (low, high, n) needs n=2 points or more")
+        raise ValueError(
+            f"{name}={given!r}: in a range (low, high, n), n is the number of points. Give n=2 "
+            "or more"
+        )
     return low, high, count
 
 
 def _increasing(name: str, given: Any, low: float, high: float, may_be_point: bool) -> Range:
     if low > high or (low == high and not may_be_point):
-        raise ValueError(f"{name}={given!r}: the low end of a range must be below its high end")
+        raise ValueError(f"{name}={given!r}: give a range whose low end is below its high end")
     if math.isinf(high - low):
-        raise ValueError(f"{name}={given!r}: the range is wider than 1e308; give a narrower range")
+        raise ValueError(f"{name}={given!r}: this range is wider than 1e308. Give a narrower range")
     return low, high

@@ -14,7 +14,7 @@ Verdict: TypeAlias = Literal["reliable", "indication", "none"]
 ROUGH = 0.05
 
 #: What is said of a number whose interval is not claimed to hold.
-NOT_CLAIMED = "not claimed to hold"
+NOT_CLAIMED = "interval not reliable"
 
 
 def verdict_if(reliable: bool) -> Verdict:

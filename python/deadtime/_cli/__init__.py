@@ -25,9 +25,9 @@ def main() -> None:
     missing = [name for name in EXTRAS if not _installed(name)]
     if missing:
         print(
-            f"the deadtime command needs {', '.join(missing)}, not installed; this line installs "
-            "what it needs:\n    pip install 'deadtime[cli]'\nand this one what draws as well:\n"
-            "    pip install 'deadtime[all]'",
+            f"the deadtime command needs {', '.join(missing)}, which is not installed. Install "
+            "what the command needs:\n    pip install 'deadtime[cli]'\nor also what drawing "
+            "needs:\n    pip install 'deadtime[all]'",
             file=sys.stderr,
         )
         raise SystemExit(1)

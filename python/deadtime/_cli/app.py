@@ -22,22 +22,22 @@ FAILURES = (DeadtimeError, ArithmeticError, MemoryError, OSError, ValueError)
 
 #: The commands with the first lines of their help. Each is `command` in the file of its name.
 COMMANDS = {
-    "estimate": "Find the plant of a recording, or the delay of a known loop, with a verdict.",
-    "inspect": "List the contents of an autopilot's log: vehicle, modes, loops, rates, gains.",
-    "latency": "Show how long each loop takes to respond, by stage, and which gains this permits.",
+    "estimate": "Find the plant from a recording, or the delay of a known loop, with a verdict.",
+    "inspect": "List what an autopilot's log contains: vehicle, modes, loops, rates, gains.",
+    "latency": "Show how long each loop takes to respond, in which stages, and which gains are "
+    "possible.",
     "roots": "Find the characteristic roots of a loop: the rightmost ones, or all in a region.",
     "map": "Map which gains of a PV controller are stable, with the boundary and the best gains.",
-    "explore": "Explore a loop in the browser: its map of gains, roots, margins, responses.",
-    "design": "Find the gains with the best worst case, within given margins.",
-    "tune": "Propose gains from a recording, in the form of your controller, with predicted "
-    "responses.",
-    "reproduce": "Reproduce the paper on delays in quadrotor control, and compare each "
-    "printed number.",
-    "fly": "Fly steps under P control, estimate the delay, design PV gains, fly with them, land.",
-    "watch": "Follow the delay of a running loop row by row, with its interval.",
-    "internet-loop": "Control an integrator over UDP, estimate its delay, and measure the delay.",
-    "simulate": "Simulate the step response of a loop, exactly.",
-    "report": "Write one page about a recording: delay, map of gains, a controller to try.",
+    "explore": "Explore a loop in the browser: its map of gains, roots, margins and responses.",
+    "design": "Find the gains that are best in the worst case, with the margins you require.",
+    "tune": "Propose gains from a recording, in your controller's units, with predicted responses.",
+    "reproduce": "Reproduce the paper on delays in quadrotor control, and compare each printed "
+    "number.",
+    "fly": "Fly steps under P control, estimate the delay, design PV gains, and fly these gains.",
+    "watch": "Follow the delay of a running loop: print delay and interval for each row.",
+    "internet-loop": "Control an integrator over UDP, and find the delay of this loop in two ways.",
+    "simulate": "Simulate the step response of a loop exactly.",
+    "report": "Write a page about a recording: its delay, its map of gains, a controller to try.",
     "demo": "Simulate a loop whose delay is known, find the delay, and design gains for it.",
     "emulate": "Emulate a vehicle, with its own network ports and protocol.",
 }
@@ -92,7 +92,7 @@ def _options(
 ) -> None:
     """Control loops with a delay in them: estimate it, map the gains, design for it.
 
-    Exit codes: 0 an answer, reliable or an indication; 3 none, because the recording does not
+    Exit codes: 0 an answer, reliable or an indication; 3 no answer, because the recording does not
     determine it; 1 an error.
     """
 

@@ -34,11 +34,11 @@ def command(
     Parameters
     ----------
     folder
-        Where to write.
+        Folder to which all files are written.
     seed
         Seed of the sensor noise.
     methods
-        Print the estimates of all methods, and why they differ.
+        Also print the estimates of all methods, and why these estimates differ.
     """
     check_pages()
     with stages(6, quiet=as_json) as begin:
@@ -74,16 +74,16 @@ def command(
         print_points(found.comparison.explanation())
         print_text("")
     print_text(
-        f"Simulated: a vehicle with a lag, commanded through {flight.truth.delay:g} s of "
-        "radio delay, with noise on the measured height. The true sum of delay and lag is "
-        f"{flight.numbers['delay+lag']:.3f} s."
+        "A simulated vehicle with a lag gets its commands over a radio link with a delay of "
+        f"{flight.truth.delay:g} s. The measured height is noisy. The true sum of delay and lag "
+        f"is {flight.numbers['delay+lag']:.3f} s."
     )
     print_text(f"\n{found.headline()}\n", "bold")
     if methods:
         for line in _next_commands(found.known, flight.window, file):
             print(line)
     print(f"open {page}")
-    print("to use your own file: deadtime estimate FILE")
+    print("To use your own file: deadtime estimate FILE")
 
 
 def _next_commands(loop: ControlLoop, window: opt.Ends, file: Path) -> list[str]:

@@ -33,7 +33,8 @@ def command(
         float | None,
         typer.Option(
             help=(
-                "Upper end of the delay in s, if the delay is an interval that begins at --delay."
+                "Upper end of the interval of the delay, s. The interval begins at --delay. "
+                "Default: the delay is exact."
             )
         ),
     ] = None,
@@ -46,7 +47,7 @@ def command(
         list[str] | None,
         typer.Option(
             help=(
-                "Keep a gain at this value, such as Kp=2. Give the option once for each such gain."
+                "Keep one gain at this value, such as Kp=2. For several gains, repeat the option."
             )
         ),
     ] = None,
@@ -54,7 +55,12 @@ def command(
     gain: opt.Gain = 1.0,
     gain_to: Annotated[
         float | None,
-        typer.Option(help=("Upper end of the plant's gain, if the gain is an interval.")),
+        typer.Option(
+            help=(
+                "Upper end of the interval of the plant's gain. The interval begins at --gain. "
+                "Default: the gain is exact."
+            )
+        ),
     ] = None,
     lag: opt.Lag = 0.0,
     sample_time: opt.Sample_time = None,
@@ -63,42 +69,52 @@ def command(
     choose_filter: Annotated[
         bool,
         typer.Option(
-            "--choose-filter", help=("Also choose the corner of the derivative's filter.")
+            "--choose-filter", help=("Also choose the corner frequency of the derivative's filter.")
         ),
     ] = False,
     objective: Annotated[
         Objective | None,
         typer.Option(
             help=(
-                "Objective of the design. Default: load, or abscissa if the corner of the filter "
-                "is chosen as well."
+                "Quantity that the design makes best. Default: load; with --choose-filter, "
+                "abscissa."
             )
         ),
     ] = None,
     max_sensitivity: Annotated[
-        float | None, typer.Option(help="Largest Ms, for loads and set points. Default: 1.6.")
+        float | None,
+        typer.Option(
+            help="Largest allowed Ms, the peak of the sensitivity function, for loads and set "
+            "points. Default: 1.6."
+        ),
     ] = None,
     noise_gain: Annotated[
         float | None,
-        typer.Option(help="Largest ratio of the command's noise to the measurement's noise."),
+        typer.Option(
+            help="Largest allowed ratio of the command's noise to the measurement's noise."
+        ),
     ] = None,
     settling_time: Annotated[
-        float | None, typer.Option(help="Longest settling time of a step, s.")
+        float | None, typer.Option(help="Longest allowed settling time of a step, s.")
     ] = None,
     gain_margin: Annotated[
-        float | None, typer.Option(help=("Least gain margin, as a factor."))
+        float | None, typer.Option(help=("Smallest allowed gain margin, as a factor."))
     ] = None,
-    phase_margin: Annotated[float | None, typer.Option(help="Least phase margin, °.")] = None,
-    delay_margin: Annotated[float | None, typer.Option(help="Least delay margin, s.")] = None,
+    phase_margin: Annotated[
+        float | None, typer.Option(help="Smallest allowed phase margin, °.")
+    ] = None,
+    delay_margin: Annotated[
+        float | None, typer.Option(help="Smallest allowed delay margin, s.")
+    ] = None,
     amplitude: Annotated[float, typer.Option(help="Size of the step.")] = 1.0,
     plot: opt.Plot = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Find the gains with the best worst case, within given margins."""
+    """Find the gains that are best in the worst case, with the margins you require."""
     if choose_filter and filter is not None:
         raise ValueError(
-            "--filter gives the corner of the filter and --choose-filter asks for a choice of "
-            "the corner: give only one of them"
+            "--filter gives the corner frequency of the filter, but --choose-filter lets the "
+            "design choose this frequency: give only one of the two options"
         )
     delay = opt.delay_beside(plant, delay)
     # The gains are varied: any that are not zero will do.

@@ -66,15 +66,16 @@ def ardrone2(
     Parameters
     ----------
     client
-        Answer this IP address only; again for more. Needed with --host.
+        Answer only this IP address. For several addresses, repeat the option. Needed with --host.
     port_base
-        Ports from here: +1, +4, +5, +6, +9. 0: free ones.
+        Base of the port numbers. The ports are this number plus 1, 4, 5, 6 and 9. With 0, free
+        ports are used.
     duration
-        End after so long, s.
+        End after this time, s.
     record
-        Write what the drone does, without noise, as CSV.
+        Write the true motion of the drone, without noise, to this CSV file.
     until_input_ends
-        End when standard input does, as whoever started this does.
+        End when standard input ends, such as with the parent process.
     """
     if duration is not None:
         positive("--duration", duration)
@@ -116,9 +117,9 @@ def print_address(emulator: Emulator, as_json: bool) -> None:
     """Print the addresses and ports of the drone once it listens."""
     options = emulator.options
     warning = (
-        f"{options.host} can be reached by other computers. Only {', '.join(options.clients)} is "
-        "answered, but addresses can be forged, and there is no authentication. Use a closed "
-        "network."
+        f"Other computers can reach the emulator at {options.host}. The emulator answers only "
+        f"{', '.join(options.clients)}, but addresses can be forged, and there is no "
+        "authentication. Use a closed network."
     )
     if not options.only_here:
         print(f"deadtime: {warning}", file=sys.stderr)
@@ -134,11 +135,11 @@ def print_address(emulator: Emulator, as_json: bool) -> None:
         return
     # The shared console would wrap the line in a file.
     Console(soft_wrap=True, highlight=False).print(
-        f"An AR.Drone 2.0 (plant {options.plant}, transport delay {options.transport_delay:g} "
-        f"s) is emulated at {emulator.host}. UDP ports: navdata {emulator.navdata_port}, "
-        f"commands {emulator.command_port}. TCP ports: configuration {emulator.control_port}, "
-        f"no files on {emulator.ftp_port}, no video on {emulator.video_port}. Ctrl-C ends the "
-        "emulation.",
+        f"The emulator of an AR.Drone 2.0 (plant {options.plant}, transport delay "
+        f"{options.transport_delay:g} s) runs at {emulator.host}. UDP ports: navdata "
+        f"{emulator.navdata_port}, commands {emulator.command_port}. TCP ports: configuration "
+        f"{emulator.control_port}, files {emulator.ftp_port} (there are none), video "
+        f"{emulator.video_port} (there is none). Ctrl-C ends the emulator.",
         markup=False,
     )
     sys.stdout.flush()

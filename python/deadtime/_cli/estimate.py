@@ -36,9 +36,9 @@ def command(
     plot: opt.Plot = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Find the plant of a recording, or the delay of a known loop, with a verdict.
+    """Find the plant from a recording, or the delay of a known loop, with a verdict.
 
-    Exit codes: 0 reliable or an indication, 3 none, 1 an error.
+    Exit codes: 0 for an estimate, reliable or an indication; 3 for no estimate; 1 for an error.
     """
     files, windows = files_and_windows(files, window)
     columns = {"time": time, "reference": reference, "output": output, "command": command}
@@ -57,7 +57,7 @@ def command(
         if value is not None:
             option = name.replace("_", "-")
             raise ValueError(
-                f"--{option} applies only if the plant is chosen from the recording: leave "
-                f"out --{option}, or {', '.join(loop.named)}"
+                f"--{option} applies only if the plant is chosen from the recording: leave out "
+                f"--{option}, or leave out {', '.join(loop.named)}"
             )
     estimate_loop(loop, as_json)

@@ -79,12 +79,13 @@ class NamedLoop:
         """The loop of each file."""
         if not self.gains["kp"]:
             raise ValueError(
-                f"{', '.join(self.named) or 'several files'}: this option needs a known "
-                "controller: give --kp, or leave the option out"
+                f"{', '.join(self.named) or 'several files'} can be used only with a known "
+                "controller: give the gain of the controller by --kp, or leave this out"
             )
         if self.corner is not None and not (self.gains["kv"] or self.gains["kd"]):
             raise ValueError(
-                "--filter is the filter of the derivative: give --kv or --kd, or leave --filter out"
+                "--filter is the filter of the derivative, but this controller has no "
+                "derivative: give --kv or --kd, or leave --filter out"
             )
         each = (_each(name, own or [0.0], self.files) for name, own in self.gains.items())
         loops = [
@@ -128,8 +129,8 @@ def estimate_loop(asked: NamedLoop, as_json: bool) -> None:
     if asked.plant in AUTOMATIC:
         if asked.free is not None or name == "all":
             raise ValueError(
-                f"--plant {asked.plant} fits all numbers of a plant by one method: leave out "
-                "--free, and give --method output_error, waveform or auto"
+                f"with --plant {asked.plant}, one method fits all parameters of the plant: leave "
+                "out --free, and give --method output_error, waveform or auto"
             )
         own = _with_options(name, asked.options)
         choice = choose_plant(flights, loops, method=own, window=asked.windows)
@@ -137,7 +138,7 @@ def estimate_loop(asked: NamedLoop, as_json: bool) -> None:
         return
     if name == "all":
         if asked.free is not None:
-            raise ValueError("--free applies to one method only: name the method by --method")
+            raise ValueError("--free works with one method only: name the method by --method")
         compared = compare_methods(flights[0], loops[0], asked.windows[0])
         _show_all(compared, findings, asked.plot, as_json)
         return
@@ -165,8 +166,8 @@ def _each(name: str, values: Sequence[Each], files: Sequence[Path]) -> list[Each
     """A value for each file, of one for all or of one each."""
     if len(values) not in (1, len(files)):
         raise ValueError(
-            f"{len(files)} {'file' if len(files) == 1 else 'files'} and {len(values)} values "
-            f"of --{name}: give one value for all files, or one for each file"
+            f"{len(files)} {('file' if len(files) == 1 else 'files')} and {len(values)} values of "
+            f"--{name} are given: give one value for all files, or one value for each file"
         )
     return list(values) * (len(files) if len(values) == 1 else 1)
 
@@ -179,12 +180,12 @@ def _chosen(method: str | None, number: int, options: Mapping[str, Any]) -> str:
         raise ValueError(f"--method {method} is not one of {', '.join(CHOICES)}")
     if method == "all" and number > 1:
         raise ValueError(
-            f"--method all compares methods on one file, but {number} files are given: fit "
-            f"them together by --method {' or '.join(JOINT)}"
+            f"--method all compares methods on one file, but {number} files are given: fit the "
+            f"files together by --method {' or '.join(JOINT)}"
         )
     if method == "all" and options:
         option = next(iter(options)).replace("_", "-")
-        raise ValueError(f"--{option} applies to one method only: name the method by --method")
+        raise ValueError(f"--{option} works with one method only: name the method by --method")
     return method
 
 
@@ -244,8 +245,9 @@ def _show_all(
     print_grave_findings(findings)
     print_table(estimates_table(comparison))
     print_text(
-        "in brackets: assumed values; sum: delay plus lag; off: difference between the sum "
-        f"and that of {comparison.best.method}, in s and in standard errors",
+        "Values in brackets are assumed. The column sum has delay plus lag. The column off has "
+        f"the difference between this sum and the sum of {comparison.best.method}, in s and in "
+        "standard errors.",
         "dim",
     )
     print_points([*comparison.explanation(), *comparison.limitations()])

@@ -15,63 +15,69 @@ CHOICES = ("all", "auto", *METHODS)
 Files = Annotated[
     list[Path],
     typer.Argument(
-        help="Tables recorded from one vehicle: CSV with a header line, Parquet, Arrow or MAT. "
-        "FILE@LOW:HIGH reads only the times LOW to HIGH, in s.",
+        help="Tables that were recorded from one vehicle: CSV with a header line, Parquet, Arrow "
+        "or MAT. With FILE@LOW:HIGH only the times from LOW to HIGH are read, in s.",
         show_default=False,
     ),
 ]
 Kp = Annotated[
     list[float] | None,
     typer.Option(
-        help="Proportional gain of the controller in the loop. Give each gain once for all files, "
-        "or once for each file. With a P controller the command need not be logged.",
+        help="Proportional gain of the controller in the loop. Give one value for all files, or "
+        "one value for each file. With a P controller the recording needs no command.",
         show_default=False,
     ),
 ]
-Kv = Annotated[list[float] | None, typer.Option(help="Velocity gain, of PV.", show_default=False)]
+Kv = Annotated[
+    list[float] | None, typer.Option(help="Velocity gain of a PV controller.", show_default=False)
+]
 Ki = Annotated[
-    list[float] | None, typer.Option(help="Integral gain, of PI and PID.", show_default=False)
+    list[float] | None,
+    typer.Option(help="Integral gain of a PI or PID controller.", show_default=False),
 ]
 Kd = Annotated[
-    list[float] | None, typer.Option(help="Derivative gain, of PD and PID.", show_default=False)
+    list[float] | None,
+    typer.Option(help="Derivative gain of a PD or PID controller.", show_default=False),
 ]
 Plant = Annotated[
     str | None,
     typer.Option(
-        help="Default: chosen from the recording. A kind, such as 'two lags'; or with --kp a "
-        "formula, such as '0.9/(s*(0.1*s+1))', where delay(T) is a delay of T s, added to "
-        "that of the loop. auto/s: an integrator with as many lags as the recording shows; "
-        "auto: the same without an integrator."
+        help="Plant. Default: chosen from the recording. Without --kp, the name of a kind of "
+        "plant, such as 'two lags'. With --kp, also a formula, such as '0.9/(s*(0.1*s+1))'. "
+        "In a formula, delay(T) is a delay of T s, which is added to the delay of the loop. "
+        "auto/s is an integrator with as many lags as the recording shows. auto has as many "
+        "lags, but no integrator."
     ),
 ]
 Method = Annotated[
     str | None,
     typer.Option(
-        help=f"{', '.join(CHOICES)}: for an integrator, or the formula of --plant. all: a "
-        "comparison. Default: the plant is chosen from the recording; with a named plant, "
-        "all, for several files auto.",
+        help=f"Method of the fit: {', '.join(CHOICES)}. It needs an integrator, or the plant "
+        "given by --plant as a formula. all compares the methods. Default: auto for several "
+        "files; all for one file with a given plant; else the plant is chosen from the "
+        "recording.",
         show_default=False,
     ),
 ]
 Free = Annotated[
     str | None,
     typer.Option(
-        help="What is fitted, for one method: of delay, gain, lag of an integrator, time_constant "
-        "of a first-order plant, lag_1, lag_2, … and zero of one of more real poles; for "
-        "waveform also limit and start. Default: delay,gain.",
+        help="Parameters that are fitted, with one method: delay and gain; lag for an "
+        "integrator; time_constant for a first-order plant; lag_1, lag_2, … and zero for "
+        "several real poles; also limit and start for waveform. Default: delay,gain.",
         show_default=False,
     ),
 ]
 Map = Annotated[
     OvershootMap | None,
-    typer.Option(help=("Map from overshoot to delay, used by the method overshoot.")),
+    typer.Option(help=("Formula by which the method overshoot converts overshoot to delay.")),
 ]
 Noise_path = Annotated[
     NoisePath | None,
     typer.Option(
         help=(
-            "Whether the sensor noise is in the recording alone, or also in the loop. For the "
-            "method waveform."
+            "Whether the sensor noise is only in the recording, or also enters the loop. Used by "
+            "the method waveform."
         )
     ),
 ]
@@ -79,7 +85,7 @@ Initial_output = Annotated[
     float | None,
     typer.Option(
         help=(
-            "True output at the first row, if it is known. For the methods output_error, "
+            "True output at the first row, if it is known. Used by the methods output_error, "
             "waveform, grid and cta."
         )
     ),
@@ -88,8 +94,8 @@ At_rest = Annotated[
     bool | None,
     typer.Option(
         "--at-rest/--not-at-rest",
-        help="Whether the plant was at rest at the first row. Default: judged from the recording. "
-        "Applies only if the plant is chosen from the recording.",
+        help="Whether the plant was at rest at the first row. Default: judged from the "
+        "recording. Applies only if the plant is chosen from the recording.",
         show_default=False,
     ),
 ]
@@ -115,7 +121,7 @@ Check = Annotated[
     bool,
     typer.Option(
         "--check",
-        help="Only check the files and print what the check finds, without an estimate. The exit "
-        "code is 1 if a file is refused.",
+        help="Only check the files, and print the findings without an estimate. The exit code is "
+        "1 if a file cannot be used.",
     ),
 ]

@@ -102,8 +102,8 @@ def estimate_plant(asked: Asked, as_json: bool) -> None:
     has_loop = loop.gains["kp"] is not None
     if plant is not None and plant not in PLANTS:
         raise ValueError(
-            f"--plant {plant}: without --kp, give one of {', '.join(map(repr, PLANTS))}; with "
-            "--kp, a formula is possible too"
+            f"--plant {plant}: without --kp, give one of {', '.join(map(repr, PLANTS))}. With "
+            "--kp, a formula such as '0.9/(s*(0.1*s+1))' is possible too"
         )
     columns = dict(asked.columns)
     findings: list[dict[str, Any]] = []
@@ -136,7 +136,7 @@ def estimate_plant(asked: Asked, as_json: bool) -> None:
         _print(fit, following)
         print_grave_findings(findings)
         if has_loop:
-            print_text(f"to compare all methods: {asked.again({'method': 'all'})}", wrapped=False)
+            print_text(f"To compare all methods: {asked.again({'method': 'all'})}", wrapped=False)
     if fit.verdict == "none":
         raise typer.Exit(NONE)
 
@@ -147,8 +147,8 @@ def _refuse_loop(loop: NamedLoop) -> None:
     for name, value in {**given, "limit": loop.limit}.items():
         if value is not None:
             raise ValueError(
-                f"--{name.replace('_', '-')} needs a known controller: give --kp, or leave "
-                "the option out"
+                f"--{name.replace('_', '-')} can be used only with a known controller: give the "
+                f"gain of the controller by --kp, or leave --{name.replace('_', '-')} out"
             )
 
 

@@ -31,23 +31,23 @@ def command(
     out: Path | None = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Explore a loop in the browser: its map of gains, roots, margins, responses.
+    """Explore a loop in the browser: its map of gains, roots, margins and responses.
 
     Parameters
     ----------
     file
-        Table with a step of the loop: the delay and the gain of the plant come from it. Default:
-        the loop of the options.
+        Table with a step of the loop, from which delay and gain are estimated. Default: the loop
+        that the options describe.
     kp
         Proportional gain.
     ki
         Integral gain.
     kd
-        Gain on the derivative of the error.
+        Derivative gain, which acts on the derivative of the error.
     delay
         Delay of the loop, s.
     out
-        Write the page here, and do not open it.
+        Write the page to this file, and do not open the browser.
     """
     loop = opt.described_loop(kp, kv, delay, ki=ki, kd=kd, corner=filter, **numbers)
     if file is None:

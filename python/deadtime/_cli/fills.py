@@ -112,7 +112,7 @@ def descriptions(target: Callable[..., Any]) -> dict[str, str]:
     --------
     >>> from deadtime.links import Limits
     >>> descriptions(Limits)["max_height"]
-    'Height that ends a flight, m.'
+    'Height above which a flight is aborted, m.'
     """
     found: dict[str, str] = {}
     for section in _SECTION.findall(inspect.getdoc(target) or ""):

@@ -21,7 +21,7 @@ def print_headline(fit: DelayEstimate) -> None:
     reliable = fit.verdict == "reliable"
     print_text(_as_option(f"{fit.headline()} ({fit.method})"), "bold" if reliable else "yellow")
     if reliable:
-        text = "No test of the model fails at the 1 % level."
+        text = "The tests of the model find no contradiction at the 1 % level."
         if "unseen_lag" in fit.details:
             words = unseen_in_words(fit.details["unseen_lag"])
             text += f" {words[0].upper()}{words[1:]} be seen."

@@ -30,18 +30,20 @@ from deadtime.links.axes import AxisName
 EMULATED_CLIMB, REAL_CLIMB = FlightPlan().limits.max_climb, Limits().max_climb
 
 CLIMB = (
-    "Largest vertical speed that is commanded, m/s. Default: "
-    f"{EMULATED_CLIMB:g} (as in the paper) for an emulator on this computer, {REAL_CLIMB:g} for "
-    "any other vehicle."
+    f"Largest vertical speed that is commanded, m/s. Default: {EMULATED_CLIMB:g} (as in the "
+    f"paper) for an emulator on this computer, {REAL_CLIMB:g} for any other vehicle."
 )
 LONGEST = Annotated[
     float,
-    typer.Option("--longest-delay", help="Longest delay up to which --adapt proves its gains, s."),
+    typer.Option(
+        "--longest-delay",
+        help="Longest delay for which --adapt proves that its gains are stable, s.",
+    ),
 ]
 
 #: The options of the ports; the help of the first is that of all.
 PORTS = {
-    "navdata_port": Annotated[int, typer.Option(help="Ports of the --host.")],
+    "navdata_port": Annotated[int, typer.Option(help="UDP or TCP port of --host.")],
     "command_port": Annotated[int, typer.Option(help="")],
     "control_port": Annotated[int, typer.Option(help="")],
 }
@@ -73,26 +75,28 @@ def command(
     ports: Annotated[Given, Fills(ARDrone2, " ".join(PORTS), **PORTS)],
     as_json: opt.As_json = False,
 ) -> None:
-    """Fly steps under P control, estimate the delay, design PV gains, fly with them, land.
+    """Fly steps under P control, estimate the delay, design PV gains, and fly these gains.
 
     Parameters
     ----------
     axes
-        What is stepped, one after the other: z (height), x (to the north), y (to the east), yaw
-        (heading). An AR.Drone has z.
+        Axes on which steps are flown, one after another: z (height), x (north), y (east), yaw
+        (heading). An AR.Drone has only z.
     gains
-        Proportional gains to learn from; of another axis than z with its name: x=0.5,0.8 (may be
-        repeated).
+        Proportional gains of the first flights, which give the estimate. For another axis than z,
+        write its name first, as in x=0.5,0.8. For several axes, repeat the option.
     step
-        Size of the steps, m, of yaw rad: 0.25 of z, 0.5 of x and y, 0.4 of yaw; of another axis
-        than z with its name: x=1 (may be repeated).
+        Size of the steps, m or (for yaw) rad. Default: 0.25 for z, 0.5 for x and y, 0.4 for yaw.
+        For another axis than z, write its name first, as in x=1. For several axes, repeat the
+        option.
     folder
-        Where recordings and report go. Default: flight, flight-2, …
+        Folder for recordings and report. Default: flight, flight-2, …
     restore
-        Fly nothing: put back the parameters that an earlier run has left changed in the vehicle at
-        --link, by its file in the --folder or the working directory.
+        Do not fly, but restore the parameters that an earlier run has left changed in the vehicle
+        at --link. The old values are read from a file in --folder or in the working directory.
     adapt
-        Afterwards fly gains that follow the delay beside robust ones, both proved.
+        Afterwards fly two more flights, one with robust gains and one with gains that follow the
+        delay. The stability of both is proved.
     """
     chosen = VehicleOptions(**vehicle, **emulated, ports=ports)
     if restore:
@@ -142,7 +146,7 @@ def _plans(
     names = [name.strip() for name in axes.split(",") if name.strip()]
     unknown = [name for name in names if name not in USUAL]
     if unknown or not names or len(set(names)) < len(names):
-        raise ValueError(f"--axes {axes}: give some of {', '.join(USUAL)}, each once")
+        raise ValueError(f"--axes {axes}: give some of {', '.join(USUAL)}, and each only once")
     given_gains, given_steps = _by_axis("--gains", gains, names), _by_axis("--step", step, names)
     checked_hold = min(given["hold"], FlightPlan().checked_hold)
     plans = []
@@ -154,7 +158,7 @@ def _plans(
             changes["gains"] = given_gains[name]
         if name in given_steps:
             if len(given_steps[name]) != 1:
-                raise ValueError(f"--step of {name}: give one size")
+                raise ValueError(f"--step gives several sizes for the axis {name}: give one size")
             changes["step"] = given_steps[name][0]
         plans.append(FlightPlan.of_axis(cast(AxisName, name), autopilot, **changes))
         plans[-1].check()
@@ -168,9 +172,12 @@ def _by_axis(option: str, given: list[str], names: list[str]) -> dict[str, tuple
         name, _, numbers = text.rpartition("=")
         name = name.strip() or "z"
         if name not in names:
-            raise ValueError(f"{option} {text}: the axis {name} is not among those of --axes")
+            raise ValueError(
+                f"{option} {text}: the axis {name} is not in --axes. Add this axis to --axes, or "
+                f"remove it from {option}"
+            )
         if name in found:
-            raise ValueError(f"{option} {text}: {name} is given twice")
+            raise ValueError(f"{option} {text}: the axis {name} is given twice")
         try:
             found[name] = tuple(float(part) for part in numbers.split(",") if part.strip())
         except ValueError:
@@ -200,8 +207,8 @@ def _print_restored(said: list[str], as_json: bool) -> None:
         print_text(
             "\n".join(said)
             or (
-                "no earlier run has left changed parameters in the vehicle, so there is nothing "
-                "to restore"
+                "there is nothing to restore, because no earlier run has left changed parameters "
+                "in the vehicle"
             )
         )
 
@@ -211,7 +218,9 @@ def _print_report(found: FlightReport) -> None:
         _print_study(study)
         if study.axis.name in found.adapted:
             print_text("\n".join(found.adapted[study.axis.name].lines()))
-    print_text(f"\nRecordings and report are in {found.folder}: {found.page.name}")
+    print_text(
+        f"\nThe recordings and the report {found.page.name} are in the folder {found.folder}."
+    )
     if found.round_trip is not None:
         print_text(
             "The round trip time of the link, measured by TIMESYNC, was "

@@ -24,20 +24,23 @@ def checked_free(text: str | None, loop: ControlLoop, method: str) -> tuple[str,
         known += [name for name in OF_WAVEFORM if name != "limit" or loop.limit is not None]
     choice = f"choose from {', '.join(known)}"
     if not names:
-        raise ValueError(f"--free names nothing to fit: {choice}")
+        raise ValueError(f"--free names no parameter: {choice}")
     for name in names:
         if name in known:
             continue
         why = f"{name!r} cannot be fitted"
         if name in FORMS:
-            why = f"this plant has no {name}; only a plant {FORMS[name]} has this number"
+            why = f"this plant has no {name}. Only a plant {FORMS[name]} has this parameter"
         elif name in OF_WAVEFORM and method != "waveform":
             why = f"{name} can be fitted only by --method waveform"
         elif name == "limit":
-            why = "the limit cannot be fitted because its initial value, --limit, is missing"
+            why = "the limit can be fitted only from an initial value: give --limit"
         raise ValueError(f"--free {text}: {why}; {choice}")
     if "delay" not in names and loop.delay is None:
-        raise ValueError(f"--free {text}: the delay is not known, so add delay to --free; {choice}")
+        raise ValueError(
+            f"--free {text}: the delay is not known, so it must be fitted. Add delay to --free; "
+            f"{choice}"
+        )
     return names
 
 
@@ -46,6 +49,6 @@ def check_fitted(names: Sequence[str], fit: DelayEstimate) -> None:
     left = [name for name in names if name not in fit.free]
     if left:
         raise ValueError(
-            f"--free {','.join(names)}: --method {fit.method} does not fit {' and '.join(left)}, "
-            f"only {', '.join(fit.free)}"
+            f"--free {','.join(names)}: --method {fit.method} cannot fit {' and '.join(left)}. It "
+            f"can fit only {', '.join(fit.free)}"
         )

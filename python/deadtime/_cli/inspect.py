@@ -44,21 +44,24 @@ def command(
     flight: opt.Flight = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """List the contents of an autopilot's log: vehicle, modes, loops, rates, gains.
+    """List what an autopilot's log contains: vehicle, modes, loops, rates, gains.
 
     Parameters
     ----------
     log
-        Log file: ULog, DataFlash (.bin or .log), tlog, Blackbox or Crazyflie uSD; or a bag of
-        messages: MCAP or ROS, whose topics and fields are listed.
+        A log file: ULog, DataFlash (.bin or .log), tlog, Blackbox or Crazyflie uSD. Or a bag (MCAP
+        or ROS), whose topics and fields are listed.
     loop
-        Tell about this loop only, for example 'roll rate'.
+        Show only this loop, such as 'roll rate'.
 
-    Exit codes: 0 an answer, 3 the log holds no loop, 1 an error.
+    Exit codes: 0 for an answer, 3 if the log contains no loop, 1 for an error.
     """
     if is_bag(log):
         if loop is not None or flight is not None:
-            raise ValueError(f"{log} is a bag, which has topics: leave --loop and --flight out")
+            raise ValueError(
+                f"{log} is a bag, so it has topics instead of loops and flights: leave --loop "
+                "and --flight out"
+            )
         _print_bag(open_bag(log), as_json)
         return
     found = open_log(log, flight=flight)
@@ -103,7 +106,7 @@ def _print_log(log: Log) -> None:
         print_table(results_table(HEADS, rows, left=("loop", "setpoint", "response")))
         print_points(_reasons(log))
     else:
-        print_text("no loop has both its setpoint and its response in the log", "yellow")
+        print_text("for no loop the log contains both the setpoint and the response", "yellow")
     if log.key_parameters:
         _print_some("parameters", [f"{name} {one:g}" for name, one in log.key_parameters.items()])
     for line in filter_lines(log):

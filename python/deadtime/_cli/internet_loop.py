@@ -50,23 +50,23 @@ def command(
     plot: opt.Plot = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Control an integrator over UDP, estimate its delay, and measure the delay.
+    """Control an integrator over UDP, and find the delay of this loop in two ways.
 
     Parameters
     ----------
     gain
-        Gain K of a run; again for the next. Default: 5 to 10.
+        Gain K of a run. For several runs, repeat the option. Default: 5 to 10.
     virtual_time
-        Not over UDP but in memory, as fast as it goes.
+        Simulate the network in memory instead of using UDP, as fast as possible.
     folder
-        Keep the recordings of both ends here.
+        Folder in which the recordings of both ends are kept.
     """
     path = network_of(**network)
     gains = tuple(gain) if gain else GAINS
     trial = Trial(gains[0], path, path, policy=policy_of(**late), **settings)
     if trial.duration < trial.rest + 1.0:
         raise ValueError(
-            f"--duration {trial.duration:g} leaves less than 1 s after the step at "
+            f"--duration {trial.duration:g} ends less than 1 s after the step, which is at "
             f"{trial.rest:g} s: give a longer duration"
         )
     with stages(2 * len(gains) + 1, quiet=as_json) as begin:
@@ -91,7 +91,7 @@ def command(
     heads = (*COLUMNS, "Table 1: Mp", "Td")
     rows = [(*run.row(), *_table_1(run.trial.gain, printed)) for run in found.runs]
     print_table(results_table(heads, rows, "Times in ms"))
-    print_text("means, 95 % intervals, and what was measured", "dim")
+    print_text("means, their 95 % intervals, and measured values", "dim")
     for line in found.lines():
         print_text(line)
     print_points([*found.explanation(), *found.refusals()])

@@ -43,15 +43,15 @@ def command(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            help="A log file, or two to compare: ULog, DataFlash (.bin or .log), tlog, Blackbox; "
-            "or a table (CSV), or a bag (MCAP, ROS).",
+            help="A log file, or two log files to compare. Formats: ULog, DataFlash (.bin or "
+            ".log), tlog, Blackbox, a table (CSV), or a bag (MCAP, ROS).",
             show_default=False,
         ),
     ],
     axis: Annotated[
         list[str] | None,
         typer.Option(
-            help=("Only loops of this axis. Give the option once for each axis."),
+            help=("Show only loops of this axis. For several axes, repeat the option."),
             show_default=False,
         ),
     ] = None,
@@ -59,14 +59,14 @@ def command(
         list[str] | None,
         typer.Option(
             help=(
-                "Only this loop, with all its details, such as 'roll rate'. Give the option "
-                "once for each loop."
+                "Show only this loop, such as 'roll rate', with all details. For several loops, "
+                "repeat the option."
             ),
             show_default=False,
         ),
     ] = None,
     verbose: Annotated[
-        bool, typer.Option("--verbose", help="Also print all loops in detail, below the table.")
+        bool, typer.Option("--verbose", help="Also print each loop in detail, below the table.")
     ] = False,
     out: Annotated[
         Path | None,
@@ -77,21 +77,25 @@ def command(
     command: Annotated[
         str | None,
         typer.Option(
-            help="Column of a table, or TOPIC:FIELD of a bag, that holds what the loop follows.",
+            help="Signal that the loop has to follow: a column of a table, or TOPIC:FIELD of a "
+            "bag.",
             show_default=False,
         ),
     ] = None,
     output: Annotated[
         str | None,
         typer.Option(
-            help=("Column of a table, or TOPIC:FIELD of a bag, that holds the response."),
+            help=("Response of the loop: a column of a table, or TOPIC:FIELD of a bag."),
             show_default=False,
         ),
     ] = None,
     reference: Annotated[
         str | None,
         typer.Option(
-            help=("Column of a table that holds what the loop follows, instead of --command."),
+            help=(
+                "Column of a table with the signal that the loop has to follow. Use it instead "
+                "of --command."
+            ),
             show_default=False,
         ),
     ] = None,
@@ -99,16 +103,19 @@ def command(
     flight: opt.Flight = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Show how long each loop takes to respond, by stage, and which gains this permits.
+    """Show how long each loop takes to respond, in which stages, and which gains are possible.
 
-    Exit codes: 0 a time, reliable or an indication; 3 none; 1 an error.
+    Exit codes: 0 for a time, reliable or an indication; 3 for no time; 1 for an error.
     """
     if len(logs) > 2:
         raise ValueError(f"{len(logs)} logs were given: give one log, or two logs to compare")
     if out is not None:
         check_pages()
         if len(logs) > 1:
-            raise ValueError("--out writes a page about one log: give one log, or leave --out out")
+            raise ValueError(
+                "--out writes a page about one log, but two logs are given: give one log, or "
+                "leave --out out"
+            )
     columns = {"time": time, "reference": reference, "output": output, "command": command}
     found = []
     with without_waiting_for_threads():
@@ -147,13 +154,13 @@ def _opened(path: Path, columns: Mapping[str, str | None], flight: int | None) -
     found = open_log(path, flight=flight)
     if named:
         raise ValueError(
-            f"{path} is a {found.format} log, from which the loops are already known: leave "
+            f"{path} is a {found.format} log, whose loops are already known: leave "
             f"{', '.join(named)} out"
         )
     if found.duration < SHORTEST:
         raise NotIdentifiableError(
-            f"{found.source} is {stated(found.duration, 0.0, 's')} long, and no loop of a "
-            "vehicle responds within it: give a longer log"
+            f"{found.source} lasts only {stated(found.duration, 0.0, 's')}, which is too short "
+            "for the response of a loop: give a longer log"
         )
     return found
 
@@ -165,11 +172,14 @@ def _of_bag(path: Path, columns: Mapping[str, str | None]) -> Recording:
         names = [f"{one}:{field}" for one, topic in bag.topics.items() for field in topic.fields]
         more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
         raise ValueError(
-            f"{path} is a bag: give the setpoint by --command and the response by --output, "
-            f"each as TOPIC:FIELD; the bag has {', '.join(names[:LISTED]) or 'none'}{more}"
+            f"{path} is a bag: give the setpoint by --command and the response by --output, each "
+            "as TOPIC:FIELD. The topics and fields of this bag are "
+            f"{', '.join(names[:LISTED]) or 'none'}{more}"
         )
     if columns["time"] is not None:
-        raise ValueError(f"{path} is a bag, whose messages already have times: leave --time out")
+        raise ValueError(
+            f"{path} is a bag, whose messages have times of their own: leave --time out"
+        )
     return bag.recording(told, came, columns["reference"])
 
 
@@ -215,7 +225,7 @@ def _print_json(found: list[Latency]) -> None:
 def _print_changes(one: Latency, other: Latency) -> None:
     changes = compare_latencies(one, other)
     if not changes:
-        print_text("no loop has a response time in both logs", "yellow")
+        print_text("for no loop a response time was found in both logs", "yellow")
         return
     rows = [
         (

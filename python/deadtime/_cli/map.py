@@ -42,34 +42,46 @@ def command(
     lag: opt.Lag = 0.0,
     sample_time: opt.Sample_time = None,
     filter: opt.Filter = None,  # noqa: A002
-    shape: Annotated[tuple[int, int], typer.Option(help="Cells along each axis.")] = (121, 121),
+    shape: Annotated[tuple[int, int], typer.Option(help="Number of cells along each axis.")] = (
+        121,
+        121,
+    ),
     counts: Annotated[
         bool,
         typer.Option(
-            "--counts", help="Only count the unstable roots, which is several times faster."
+            "--counts", help="Only count the unstable roots. This is several times faster."
         ),
     ] = False,
     decay: Annotated[
         float,
         typer.Option(
-            help=("Call a cell stable only if every root decays at least at this rate, 1/s.")
+            help=(
+                "Slowest allowed decay rate, 1/s. A cell with a root that decays more slowly "
+                "counts as unstable."
+            )
         ),
     ] = 0.0,
     damping: Annotated[
         opt.Ends | None,
         typer.Option(
-            help="Call a cell stable only if roots that decay slower than this rate, 1/s, have at "
-            "least this damping ratio."
+            help="A damping ratio and a decay rate, 1/s. A cell counts as unstable if a root "
+            "decays more slowly than this rate, with less damping than this ratio."
         ),
     ] = None,
     proof: Annotated[
-        Proof, typer.Option(help="Prove whole rows by their crossings, or each cell by itself.")
+        Proof,
+        typer.Option(
+            help="Prove stability for whole rows, by their crossings of the imaginary axis, or for "
+            "each cell alone."
+        ),
     ] = "curves",
     along: Annotated[
-        Gains | None, typer.Option(help="List the crossings of the imaginary axis along this gain.")
+        Gains | None,
+        typer.Option(help="List the values of this gain at which roots cross the imaginary axis."),
     ] = None,
     at: Annotated[
-        float | None, typer.Option(help="Value of the other gain. Default: that of the best cell.")
+        float | None,
+        typer.Option(help="Value of the other gain. Default: its value in the best cell."),
     ] = None,
     plot: opt.Plot = None,
     as_json: opt.As_json = False,
@@ -132,8 +144,8 @@ def command(
         gains = ", ".join(f"{name} = {value:.4g}" for name, value in best.items())
         further = "infinite" if margin == np.inf else f"{margin:.4g} s"
         print_text(
-            f"most stable cell: {gains}, spectral abscissa {abscissa:.4g} 1/s; its delay margin is "
-            f"{further}",
+            f"most stable cell: {gains} with spectral abscissa {abscissa:.4g} 1/s and delay "
+            f"margin {further}",
             wrapped=False,
         )
     if crossed is not None:
@@ -156,8 +168,8 @@ def _crossings_along(
     if at is None:
         if best is None:
             raise ValueError(
-                f"--along {along} needs --at: the best cell, whose gain would be the default, "
-                "is not known"
+                f"--along {along}: the value of the other gain is missing, and no best cell is "
+                "known as its default. Give --at"
             )
         at = best[other]
     ends = (float(axes[along][0]), float(axes[along][-1]))

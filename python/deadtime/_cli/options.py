@@ -40,28 +40,34 @@ Ends = tuple[float, float]
 File = Annotated[
     Path,
     typer.Argument(
-        help="Table: CSV with a header line, Parquet, Arrow or MAT.", show_default=False
+        help="A table: CSV with a header line, Parquet, Arrow or MAT.", show_default=False
     ),
 ]
 Time = Annotated[
     str | None,
     typer.Option(
-        help="Column of the time stamps, s. Default: one with a usual name.", show_default=False
+        help="Column of the time stamps, s. Default: the column with a usual name, such as time.",
+        show_default=False,
     ),
 ]
 Reference = Annotated[
     str | None,
     typer.Option(
-        help="Column of the reference. Default: one with a usual name.", show_default=False
+        help="Column of the reference. Default: the column with a usual name, such as reference.",
+        show_default=False,
     ),
 ]
 Output = Annotated[
     str | None,
     typer.Option(
-        help="Column of the measured output. Default: one with a usual name.", show_default=False
+        help="Column of the measured output. Default: the column with a usual name, such as "
+        "output.",
+        show_default=False,
     ),
 ]
-Command = Annotated[str | None, typer.Option(help="Column of the command, if it was logged.")]
+Command = Annotated[
+    str | None, typer.Option(help="Column of the command, if the command was logged.")
+]
 Window = Annotated[
     Ends | None, typer.Option(help=("Use only the samples between these two times, s."))
 ]
@@ -71,21 +77,23 @@ Delay = Annotated[
     float | None,
     typer.Option(
         help=(
-            "Delay of the loop, s. It is added to the delay of --plant. Default: 0 if --plant "
-            "has a delay."
+            "Delay of the loop, s. The delay of --plant is added. Default: 0 if --plant has a "
+            "delay."
         ),
         show_default=False,
     ),
 ]
 Gain = Annotated[
     float,
-    typer.Option(help=("Gain of the integrating plant. With --plant, a factor on that plant.")),
+    typer.Option(
+        help=("Gain of the integrating plant. With --plant, a factor that multiplies this plant.")
+    ),
 ]
 Plant = Annotated[
     str | None,
     typer.Option(
-        help="Plant in place of the integrator, such as '0.9/(s*(0.1*s+1))'; delay(T) in it is a "
-        "delay of T s, added to that of the loop."
+        help="Plant instead of the integrator, such as '0.9/(s*(0.1*s+1))'. delay(T) is a delay "
+        "of T s, which is added to the delay of the loop."
     ),
 ]
 Lag = Annotated[float, typer.Option(help="Lag of the plant, s.")]
@@ -98,16 +106,16 @@ Sample_time = Annotated[
         )
     ),
 ]
-Limit = Annotated[float | None, typer.Option(help="Largest magnitude of the command.")]
+Limit = Annotated[float | None, typer.Option(help="Largest magnitude that the command can have.")]
 Filter = Annotated[
     float | None,
-    typer.Option(help="Corner of the derivative's filter, rad/s. Default: no filter."),
+    typer.Option(help="Corner frequency of the derivative's filter, rad/s. Default: no filter."),
 ]
 Plot = Annotated[
     Path | None,
     typer.Option(help="Write a picture to this file (.png, .svg or .pdf).", callback=_drawn_later),
 ]
-As_json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
+As_json = Annotated[bool, typer.Option("--json", help="Print only JSON.")]
 Flight = Annotated[
     int | None,
     typer.Option(
@@ -145,8 +153,8 @@ def described_loop(
     controller = _described_controller(kp, kv, ki, kd, corner)
     if plant is not None and lag != 0.0:
         raise ValueError(
-            "--lag is the lag of the integrating plant, but --plant is given: write the lag "
-            "into --plant"
+            "--lag belongs to the integrating plant, but --plant gives another plant: write the "
+            "lag into --plant"
         )
     loop = ControlLoop(
         Integrator(gain=gain, lag=lag) if plant is None else plant_from(plant),
@@ -183,8 +191,8 @@ def _described_controller(
     if kv != 0.0:
         if ki != 0.0 or kd != 0.0:
             raise ValueError(
-                "--kv is the velocity gain of PV, and --ki and --kd are those of PI, PD and PID: "
-                "give --kv, or the others"
+                "--kv is a gain of PV control, and --ki and --kd are gains of PI, PD and PID "
+                "control: give --kv alone, or leave --kv out"
             )
         return PV(Kp=kp, Kv=kv, filter=smoothing)
     if ki != 0.0:
@@ -203,7 +211,7 @@ def check_duration(loop: ControlLoop, duration: float | None = None) -> None:
         times["one over --filter"] = 1.0 / numbers["omega"]
     if isinstance(loop.plant, RationalPlant):
         fastest = float(np.abs(np.roots(loop.plant.den)).max(initial=0.0))
-        times["one over the fastest pole of --plant"] = 1.0 / fastest if fastest else 0.0
+        times["1 divided by the fastest pole of --plant"] = 1.0 / fastest if fastest else 0.0
     if duration is None:
         duration = 10.0 * max(times.values())
     finite("--duration", duration)
@@ -211,6 +219,6 @@ def check_duration(loop: ControlLoop, duration: float | None = None) -> None:
         if 0.0 < length < duration / MOST_PARTS:
             raise ValueError(
                 f"{name} is {length:g} s, less than a millionth of the {duration:g} s to "
-                "simulate, so the run would take too long. Leave this time out, or shorten "
-                "the simulation"
+                "simulate, so the simulation would take too long. Leave this time out, or "
+                "simulate a shorter time"
             )

@@ -61,6 +61,6 @@ def _ports(process: subprocess.Popen[str]) -> dict[str, int]:
         return {name: int(ports[name]) for name in PORTS}
     except (ValueError, KeyError, TypeError):
         raise LinkError(
-            f"the emulator did not start within {STARTING:g} s: run 'deadtime emulate ardrone2' "
-            "to see why"
+            f"the emulator did not start within {STARTING:g} s. To see the reason, run 'deadtime "
+            "emulate ardrone2'"
         ) from None

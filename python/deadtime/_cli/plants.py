@@ -48,7 +48,7 @@ def plant_from(text: str) -> TransferFunction:
         If it describes none; the message says where.
     """
     if len(text) > _LONGEST:
-        raise ValueError(f"--plant has {len(text)} characters: give at most {_LONGEST}")
+        raise ValueError(f"--plant is a formula of {len(text)} characters: give at most {_LONGEST}")
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except SyntaxError as error:
@@ -123,7 +123,9 @@ class _Reader:
             case ast.Call(func=ast.Name(id="delay"), args=[only], keywords=[]):
                 return self.late(only)
             case ast.Name():
-                raise self.misread(node, f"{node.id!r} is not a name that a plant may contain")
+                raise self.misread(
+                    node, f"{node.id!r} is not a name that a formula of --plant may contain"
+                )
             case ast.BinOp(op=ast.BitXor()):
                 raise self.misread(node, "write a power with **, as in s**2")
             case ast.Call(func=ast.Name(id="exp")):
@@ -135,7 +137,7 @@ class _Reader:
         try:
             found = _OPERATORS[type(node.op)](left, right)
         except ZeroDivisionError:
-            raise self.misread(node.right, "this divides by zero") from None
+            raise self.misread(node.right, "the formula divides by zero") from None
         except (ValueError, ArithmeticError) as error:
             raise self.misread(node, str(error)) from None
         return self.number(node, found) if isinstance(found, float) else found
@@ -155,9 +157,11 @@ class _Reader:
         try:
             found = base**exponent
         except ZeroDivisionError:
-            raise self.misread(node.left, "this divides by zero") from None
+            raise self.misread(node.left, "the formula divides by zero") from None
         except (ValueError, OverflowError):
-            raise self.misread(node, "this power is out of range") from None
+            raise self.misread(
+                node, "the result of this power exceeds the range of double precision"
+            ) from None
         return self.number(node, found) if isinstance(base, float) else found
 
     def late(self, node: ast.expr) -> QuasiPolynomial:
@@ -172,7 +176,7 @@ class _Reader:
         except (OverflowError, TypeError):  # too large, or complex
             number = math.nan
         if not math.isfinite(number):
-            raise self.misread(node, "this is not a finite real number")
+            raise self.misread(node, "the formula contains a number that is not finite or not real")
         return number
 
     def misread(self, node: ast.expr, why: str) -> ValueError:

@@ -25,12 +25,12 @@ def command(
     out: Path = Path("report.html"),
     as_json: opt.As_json = False,
 ) -> None:
-    """Write one page about a recording: delay, map of gains, a controller to try.
+    """Write a page about a recording: its delay, its map of gains, a controller to try.
 
     Parameters
     ----------
     out
-        The page to write.
+        File of the page.
     """
     check_pages()
     recording = read_recording(file, **columns)

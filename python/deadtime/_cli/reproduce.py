@@ -41,7 +41,9 @@ def command(
     only: Annotated[
         str | None,
         typer.Option(
-            help=(f"Parts to reproduce, separated by commas. They are {', '.join(PARTS)}.")
+            help=(
+                f"Parts to reproduce, with commas between them. Possible parts: {', '.join(PARTS)}."
+            )
         ),
     ] = None,
     pictures: Literal["png", "svg", "pdf"] = "png",
@@ -54,7 +56,7 @@ def command(
     out
         Folder for the figures and the page.
     page
-        The page. Default: reproduction.html in the folder.
+        File of the page. Default: reproduction.html in the folder.
     pictures
         Format of the figures.
     """

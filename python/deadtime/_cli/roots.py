@@ -38,18 +38,19 @@ def command(
     Parameters
     ----------
     re
-        Region: real parts, 1/s.
+        Range of the real parts of a region, 1/s.
     im
-        Region: imaginary parts, rad/s.
+        Range of the imaginary parts of a region, rad/s.
     rightmost
-        At most how many of those with Im s >= 0, without a region.
+        Number of rightmost roots with Im s >= 0, if no region is given.
     certificate
-        File the proof of their number as JSON; with --plot, draw it, too.
+        Write the proof of the number of roots to this file, as JSON. With --plot, the proof is
+        drawn too.
     """
     delay = opt.delay_beside(numbers["plant"], delay)
     loop = opt.described_loop(kp, kv, delay, corner=filter, **numbers)
     if (re is None) != (im is None):
-        raise ValueError("a region needs both --re and --im: give both, or neither")
+        raise ValueError("a region needs both --re and --im: give both, or leave both out")
     found = loop.rightmost(rightmost) if re is None else loop.poles(re, im)
     chain = -np.inf if loop.is_sampled else loop.characteristic().chain_abscissa()
     proof = None
@@ -89,5 +90,5 @@ def command(
     print_table(results_table(HEADS, rows))
     print_text(listed(found, rightmost if re is None else None, chain))
     if np.isfinite(chain):
-        print_text(f"neutral: a chain of roots approaches Re s = {chain:.6g}")
+        print_text(f"the equation is neutral: a chain of roots approaches Re s = {chain:.6g}")
     print_text(verdict(loop))

@@ -74,10 +74,13 @@ def check_picture(path: Path) -> None:
     """Refuse a file to which no figure can be written; called before the long computation."""
     check_matplotlib()
     if path.suffix.lower() not in PICTURES:
-        raise ValueError(f"{path} is not the name of a picture: end it in {', '.join(PICTURES)}")
+        raise ValueError(
+            f"the name of a picture must end in {', '.join(PICTURES)}, but {path} is given"
+        )
     if not path.parent.is_dir():
         raise ValueError(
-            f"{path}: there is no folder {path.parent}; create the folder, or give another one"
+            f"{path}: the folder {path.parent} does not exist. Create this folder, or give "
+            "another one"
         )
 
 

@@ -37,18 +37,18 @@ def command(
     plot: opt.Plot = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Simulate the step response of a loop, exactly.
+    """Simulate the step response of a loop exactly.
 
     Parameters
     ----------
     duration
-        How long, s.
+        Duration of the simulation, s.
     amplitude
         Size of the step.
     points
-        Output times.
+        Number of output times.
     out
-        Write time, reference, output, command.
+        Write a table with time, reference, output and command to this file.
     """
     delay = opt.delay_beside(numbers["plant"], delay)
     loop = opt.described_loop(kp, kv, delay, corner=filter, **numbers)
@@ -79,9 +79,9 @@ def command(
             },
         )
         return
-    limited = " (without the limit on its command)" if loop.limit is not None else ""
+    limited = " (the limit of the command is ignored)" if loop.limit is not None else ""
     print_text(f"the loop{limited} is {verdict(loop)}")
     for name, value in figures.items():
         if stable or name in PEAK:
-            shown = f"{value:.6g}" if np.isfinite(value) else "not within the time simulated"
+            shown = f"{value:.6g}" if np.isfinite(value) else "not within the simulated time"
             print_text(f"{name.replace('_', ' '):<20}{shown}")

@@ -36,8 +36,8 @@ def command(
     file: Annotated[
         Path,
         typer.Argument(
-            help="A table with a bump test or a closed-loop recording, FILE or FILE@LOW:HIGH; or "
-            "the log of a vehicle.",
+            help="A table with a bump test or a closed-loop recording, as FILE or FILE@LOW:HIGH. "
+            "Or the log of a vehicle.",
             show_default=False,
         ),
     ],
@@ -67,50 +67,53 @@ def command(
     out: Path | None = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Propose gains from a recording, in the form of your controller, with predicted responses.
+    """Propose gains from a recording, in your controller's units, with predicted responses.
 
-    Exit codes: 0 gains; 3 none, with the reason; 1 an error.
+    Exit codes: 0 for gains; 3 for no gains, with the reason; 1 for an error.
 
     Parameters
     ----------
     controller
-        Kind of controller. Default: PI, of a log the kind that was flown.
+        Kind of controller. Default: PI for a table, the kind that was flown for a log.
     form
-        How the gains are typed. Default: parallel, of a log as its firmware has them.
+        Form and units in which your controller takes gains. Default: parallel for a table, the form
+        of the firmware for a log.
     loop
-        Loop of a vehicle, such as 'altitude' or 'roll rate'. Default: the first that the log
+        Loop of a vehicle, such as 'altitude' or 'roll rate'. Default: the first loop that the log
         determines.
     firmware
-        Version of the firmware, for a table.
+        Version of the firmware. Needed only for a table.
     kp
-        Proportional gain that was in use: new gains differ by at most a factor of two.
+        Proportional gain that was in use. New gains differ from the gains in use by at most a
+        factor of two.
     ki
         Integral gain that was in use.
     kd
         Derivative gain that was in use.
     spans
-        Spans of measurement and output, for a proportional band.
+        Spans of the measurement and of the controller's output. With spans, the proportional band
+        is given too.
     filter_hz
-        Corner of the derivative's filter, one pole, Hz.
+        Corner frequency of the derivative's filter, which has one pole, Hz.
     weight
-        Weight of the set point in the proportional term: 1 where your controller has none. Default:
-        the one with which a step settles first.
+        Weight of the set point in the proportional term. If your controller has no weight, give 1.
+        Default: the weight with which a step settles first.
     plant
         Kind of plant, if it is known, such as 'two lags'.
     objective
-        Objective. Default: the response to a load.
+        Quantity that the design makes best. Default: load, the response to a load.
     max_sensitivity
-        Largest Ms. Default: 1.6.
+        Largest allowed Ms, the peak of the sensitivity function. Default: 1.6.
     gain_margin
-        Least gain margin, a factor.
+        Smallest allowed gain margin, as a factor.
     phase_margin
-        Least phase margin, °.
+        Smallest allowed phase margin, °.
     delay_margin
-        Least delay margin, s.
+        Smallest allowed delay margin, s.
     allow_indication
-        Propose gains for an estimate that is an indication, too.
+        Propose gains even if the estimate is only an indication.
     out
-        Write a page with the gains and what they are expected to do.
+        Write a page to this file, with the gains and the predicted responses.
     """
     if out is not None:
         check_pages()
@@ -142,7 +145,7 @@ def command(
         else:
             if flight is not None:
                 raise ValueError(
-                    "--flight selects a flight in the log of a vehicle, and a table has no "
+                    "--flight selects a flight in the log of a vehicle, but a table has no "
                     "flights: leave --flight out"
                 )
             _check_form(form or "parallel", loop, firmware)
@@ -171,13 +174,13 @@ def _template(
     """The kind of controller that is asked for, with its filter and weight; None where none is."""
     if corner is not None and kind not in ("PV", "PD", "PID"):
         raise ValueError(
-            "--filter-hz is the filter of a derivative, which this controller does not have: "
-            "give --controller PV, PD or PID"
+            "--filter-hz belongs to a derivative, which this controller does not have: give "
+            "--controller PV, PD or PID"
         )
     if weight is not None and kind not in (None, "PI", "PID"):
         raise ValueError(
-            "--weight is the weight of the set point, which this controller does not have: "
-            "give --controller PI or PID"
+            "--weight is the weight of the set point, which this controller does not have: give "
+            "--controller PI or PID"
         )
     if corner is None and weight is None:
         return None if kind is None else CONTROLLERS[kind]
@@ -198,12 +201,13 @@ def _check_form(form: Form, loop: str | None, firmware: str) -> None:
     if loops is None and (loop or firmware):
         option = "--loop" if loop else "--firmware"
         raise ValueError(
-            f"{option} needs the form of a vehicle, and the form {form} is not one: leave "
-            f"{option} out, or give --form {', '.join(LOOPS_OF_FORMS)}"
+            f"{option} applies only to the form of a vehicle, but {form} is not the form of a "
+            f"vehicle: leave {option} out, or give --form {', '.join(LOOPS_OF_FORMS)}"
         )
     if loops is not None and loop not in loops:
         raise ValueError(
-            f"--loop {loop or 'is missing'}: the loops of {form} are {', '.join(loops)}"
+            f"--loop {loop or 'is missing'}: give one of the loops of {form}, which are "
+            f"{', '.join(loops)}"
         )
 
 
@@ -214,7 +218,7 @@ def _flown(
     if kp is None:
         if ki is not None or kd is not None:
             raise ValueError(
-                "--ki and --kd are gains that were in use together with --kp: give --kp too"
+                "--ki and --kd are gains that were used together with --kp: give --kp too"
             )
         return None
     ki, kd = ki or 0.0, kd or 0.0
@@ -226,7 +230,8 @@ def _refuse(given: Given) -> None:
     for name, value in given.items():
         if value not in (None, "", False):
             raise ValueError(
-                f"--{name} is only for tables, not for the log of a vehicle: leave --{name} out"
+                f"--{name} applies only to tables, but the log of a vehicle is given: leave "
+                f"--{name} out"
             )
 
 
@@ -262,6 +267,6 @@ def _next(found: Proposal, path: Path) -> str:
             option = "kd" if name == "Kv" else name.lower()
             words += [f"--{option}", f"{gain:.6g}"]
     return (
-        "try these gains, record a step of the set point, and check the recording: "
+        "Try these gains, record a step of the set point, and check the recording: "
         f"{shlex.join(words)}"
     )

@@ -26,26 +26,26 @@ class VehicleOptions:
     Parameters
     ----------
     host : str, optional
-        Address of an AR.Drone 2.0. Without --host or --link: an emulator is started.
+        Address of an AR.Drone 2.0. Without --host and --link, an emulator is started.
     link : str, optional
-        Vehicle with ArduPilot or PX4: udp:HOST:PORT waits there for it, udpout:HOST:PORT sends
-        first, tcp:HOST:PORT connects, serial:DEVICE:BAUD is a serial port. Several links to it have
-        commas between them.
+        Link to a vehicle with ArduPilot or PX4. udp:HOST:PORT waits for the vehicle,
+        udpout:HOST:PORT sends first, tcp:HOST:PORT connects, and serial:DEVICE:BAUD is a serial
+        port. For several links to one vehicle, write commas between the links.
     key : Path, optional
-        File with the signing key of the --link: 32 bytes, or 64 hexadecimal digits. What is not
-        signed is refused then.
+        File with the key that signs the messages of --link, as 32 bytes or 64 hexadecimal digits.
+        Messages that are not signed are then ignored.
     consent : bool
-        Needed with --host, and with a --link to another computer or to what is no simulator: a
-        vehicle is about to take off there.
+        Confirms that a vehicle may take off and fly. Needed with --host, and with a --link to
+        another computer or to a vehicle that is not a simulator.
     plant : {"kit", "paper", "real", "thrust"}
-        What the emulator flies like.
+        Model of the vehicle in the emulator.
     moving_delay : str, optional
-        Delay of the emulator's commands in --virtual-time, s: the first one, and the one that it
-        goes to and back from during --adapt.
+        Two delays of the emulator's commands, s, for --virtual-time. During --adapt the delay goes
+        from the first to the second and back.
     seed : int
-        Of the emulator's noise.
+        Seed of the emulator's noise.
     virtual_time : bool
-        Emulator and client in one process, in seconds.
+        Run the emulator and this program in one process, faster than in real time.
     ports : dict of str to int
         Ports of the host.
     """
@@ -63,12 +63,12 @@ class VehicleOptions:
     def __post_init__(self) -> None:
         if self.host is not None and self.link is not None:
             raise ValueError(
-                "--host is the address of an AR.Drone, and --link that of ArduPilot or PX4: "
-                "give only one of them"
+                "--host is the address of an AR.Drone, and --link the address of ArduPilot or "
+                "PX4: give only one of the two"
             )
         if self.key is not None and self.link is None:
             raise ValueError(
-                "--key signs the messages of a link, but no link is given: give --link"
+                "--key is the key that signs messages of a link, but no link is given: give --link"
             )
 
     @property
@@ -89,36 +89,36 @@ class VehicleOptions:
         """Refuse a vehicle that is not on this computer alone without consent."""
         if self.elsewhere is not None and not self.consent:
             raise ValueError(
-                f"nothing was sent to {self.elsewhere}: a drone at this address would take "
-                "off twice and fly as described above. Add --i-have-a-safe-area if the flight "
-                "cannot hurt or damage anything"
+                f"nothing was sent to {self.elsewhere}. A drone at this address would take off "
+                "twice and fly as described above. If the flight cannot hurt or damage anything, "
+                "add --i-have-a-safe-area"
             )
 
     def moving(self) -> MovingDelay | None:
         """The delay of the emulator, if it moves."""
         if self.virtual_time and (self.host is not None or self.link is not None):
             raise ValueError(
-                "--virtual-time works with the emulator only, because a vehicle flies in real "
-                "time: leave one of the two options out"
+                "--virtual-time works only with the emulator, because a vehicle flies in real "
+                "time: leave out --virtual-time or the address of the vehicle"
             )
         if self.moving_delay is None:
             return None
         if not self.virtual_time:
             raise ValueError(
-                "--moving-delay needs the emulator in virtual time: add --virtual-time"
+                "--moving-delay works only with the emulator in virtual time: add --virtual-time"
             )
         try:
             first, longest = (float(part) for part in self.moving_delay.split(","))
         except ValueError:
             raise ValueError(
-                f"--moving-delay {self.moving_delay}: give two delays, such as 0.1,0.5"
+                f"--moving-delay {self.moving_delay}: give two delays in s, such as 0.1,0.5"
             ) from None
         return MovingDelay((first, longest))
 
     def restored(self, folder: Path | None) -> list[str]:
         """Put back what earlier runs have left changed over the link; what was done."""
         if self.link is None:
-            raise ValueError("--restore needs a vehicle on a link: give --link")
+            raise ValueError("--restore needs a vehicle on a link: give its address by --link")
         with terminated_like_interrupted():
             link = MAVLinkVehicle(self.link, key=self._key(), folder=folder)
             return run_landing(link.restore())

@@ -25,7 +25,7 @@ def verdict(loop: ControlLoop) -> str:
     if chain > 0.0:
         return f"unstable: a chain of roots approaches Re s = {chain:.6g} 1/s"
     return (
-        f"not proved stable: spectral abscissa {abscissa:.6g} 1/s; a root is on the imaginary "
+        f"not proved stable: spectral abscissa {abscissa:.6g} 1/s. A root is on the imaginary "
         "axis, or too close to the axis for a proof"
     )
 
@@ -39,16 +39,20 @@ def listed(found: RootSet, requested: int | None, chain: float) -> str:
     (low, high), (bottom, top) = found.region
     if requested is None:
         return (
-            f"{number} in re=({low:g}, {high:g}), im=({bottom:g}, {top:g}): all there are, proved"
+            f"{number} in re=({low:g}, {high:g}), im=({bottom:g}, {top:g}). The list is "
+            "proved to be complete"
         )
     upper = sum(1 for root in found.roots.tolist() if root.imag >= 0.0)
     if not math.isfinite(low):
-        return f"{number}: all there are, proved"
+        return f"{number}. The list is proved to be complete"
     if upper >= requested:
-        return f"{number}: all right of Re s = {low:.6g}, proved"
+        return f"{number}. The list is proved to be complete right of Re s = {low:.6g}"
     if math.isfinite(chain):
         return (
-            f"{number}, not {requested}: all right of Re s = {low:.6g}, proved; the next ones are "
-            "those of the chain"
+            f"{number} instead of the {requested} that were asked for. The list is proved to be "
+            f"complete right of Re s = {low:.6g}. The next roots belong to the chain"
         )
-    return f"{number}, not {requested}: all right of Re s = {low:.6g}, proved"
+    return (
+        f"{number} instead of the {requested} that were asked for. The list is proved to be "
+        f"complete right of Re s = {low:.6g}"
+    )

@@ -44,36 +44,36 @@ def command(
     page: bool = False,
     as_json: opt.As_json = False,
 ) -> None:
-    """Follow the delay of a running loop row by row, with its interval.
+    """Follow the delay of a running loop: print delay and interval for each row.
 
     Parameters
     ----------
     source
-        A table as of `estimate`; with --follow a CSV that grows; or udp:HOST:PORT, where a MAVLink
-        link is listened to. Nothing is ever sent.
+        A table, as for `estimate`. With --follow, a CSV file that grows. Or udp:HOST:PORT, where
+        the program listens to a MAVLink link and never sends.
     command
         Column of the command.
     lags
-        The lag is between these, s. Default: it is --lag.
+        Smallest and largest possible lag, s. Default: the lag is --lag.
     noise
-        Deviation of the sensor's white noise. Default: noise and wind are estimated from the first
-        seconds.
+        Standard deviation of the sensor's white noise. Default: noise and wind are estimated from
+        the first seconds.
     follow
-        The file grows: wait for further lines.
+        Wait for further lines of a file that grows.
     axis
-        Of a link.
+        Axis of the vehicle on a link.
     key
-        File with the signing key of the link: 32 bytes, or 64 hexadecimal digits. What is not
-        signed is refused then.
+        File with the key that signs the messages of the link, as 32 bytes or 64 hexadecimal digits.
+        Messages that are not signed are then ignored.
     system
-        MAVLink system of the vehicle on a link. Default: that of the first heartbeat of an
-        autopilot. What others send is ignored.
+        MAVLink system number of the vehicle on a link. Default: the system of the first autopilot
+        that sends a heartbeat. Messages of other systems are ignored.
     silence
-        End after so many seconds without a line or message.
+        End after this time without a new line or message, s.
     every
-        Time between lines that are printed, s.
+        Time between printed lines, s.
     page
-        Serve a live page as well, to this computer alone.
+        Also show a live page, in browsers of this computer only.
     """
     if page:
         check_pages()
@@ -106,7 +106,7 @@ def command(
         if found:  # an error loses no row that was printed
             _print_summary(source, found, rows, as_json)
     if not found:
-        raise RecordingError(f"{source}: no row has arrived")
+        raise RecordingError(f"no row has arrived from {source}")
 
 
 def _print_summary(source: str, found: list[OnlineEstimate], rows: int, as_json: bool) -> None:
@@ -114,7 +114,7 @@ def _print_summary(source: str, found: list[OnlineEstimate], rows: int, as_json:
     if as_json:
         print_json("watch", {"source": source, **track.to_dict()})
     else:
-        print_text(f"{rows} rows; summary of the rows that are printed above:")
+        print_text(f"Summary of the {rows} rows that are printed above:")
         print_text(track.summary())
 
 
@@ -131,7 +131,10 @@ def _events(
         secret = None if key is None else read_key(key)
         return heard_rows(LinkAddress.of(source), axis, silence, secret, system)
     if key is not None:
-        raise ValueError(f"--key signs a link, but {source} is a file: leave --key out")
+        raise ValueError(
+            f"--key is the key that signs messages of a link, but {source} is a file: leave "
+            "--key out"
+        )
     if system is not None:
         raise ValueError(
             f"--system selects a vehicle on a link, but {source} is a file: leave --system out"
@@ -168,4 +171,4 @@ def _is_told(now: OnlineEstimate, last: OnlineEstimate, every: float) -> bool:
 
 
 def _said(estimate: OnlineEstimate) -> str:
-    return f"{estimate}; the delay has changed" if estimate.changed else str(estimate)
+    return f"{estimate}. The delay has changed" if estimate.changed else str(estimate)

@@ -33,5 +33,6 @@ def _end(path: Path, text: str) -> float | None:
         return float(text)
     except ValueError:
         raise ValueError(
-            f"{path}: {text!r} is not a time. Write a file with a window as FILE@LOW:HIGH, in s"
+            f"{path}: {text!r} is not a time. To read only a part of a file, write "
+            "FILE@LOW:HIGH with two times in s"
         ) from None

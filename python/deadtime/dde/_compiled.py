@@ -77,4 +77,6 @@ def _check_numba(signature: Any) -> None:
 
 
 def _refusal(signature: str) -> ValueError:
-    return ValueError(f"fun has the signature {signature}, but must have {_SIGNATURE}")
+    return ValueError(
+        f"fun has the signature {signature}, but it must have the signature {_SIGNATURE}"
+    )

@@ -70,7 +70,7 @@ class DelaySolution:
             If a time is outside, or `nu` is neither 0 nor 1.
         """
         if nu not in (0, 1):
-            raise ValueError(f"nu={nu!r}: give 0 for values or 1 for derivatives")
+            raise ValueError(f"nu={nu!r}: give 0 for values, or 1 for derivatives")
         times = real_array("t", t)  # type: ignore[arg-type]
         values = self._pieces.evaluate(np.ascontiguousarray(times.ravel()), nu)
         return values.reshape(values.shape[0], *times.shape)

@@ -162,7 +162,8 @@ def solve_dde(
         raise TypeError(f"fun={fun!r} is not a function: give a function")
     if compiled is not None and args:
         raise ValueError(
-            "args: a compiled function takes no args; put its data into its LowLevelCallable"
+            "a compiled function takes no args: leave args out, and put the data into the "
+            "LowLevelCallable"
         )
     run = native.solve_dde(
         DelayProblem(
@@ -253,22 +254,22 @@ def _message(run: native.DelayRun) -> str:
     if run.outcome == "max_steps":
         return (
             f"max_steps={run.n_elements + run.n_rejected} elements were tried by t={run.end!r}, "
-            f"and {run.n_rejected} of them refused. Where fun switches on y and holds it at the "
-            "switch (a sliding mode), smooth the switch; where fun is noisy, or rtol and atol ask "
-            "for less than the rounding of t, raise them; where the run is long, give a larger "
-            "max_steps."
+            f"and {run.n_rejected} of them were refused. If fun switches on y and the switch "
+            "keeps y in place (a sliding mode), smooth the switch. If fun is noisy, or rtol "
+            "and atol demand more than double precision, raise rtol and atol. If the run is "
+            "long, give a larger max_steps."
         )
     if run.outcome == "short":
         return (
-            f"Elements became as short as rounding allows at t={run.end!r}: the solution grows "
-            "without bound there, or the right-hand side is rough. Declare times at which it "
-            "jumps (jumps), raise rtol and atol, or limit max_step; a linear loop with a limit "
-            "is solved exactly by ControlLoop.simulate."
+            f"At t={run.end!r} the elements became as short as rounding allows. Either the "
+            "solution grows without bound there, or the right-hand side is rough. If the "
+            "right-hand side jumps, give the times of the jumps (jumps). Or raise rtol and atol, "
+            "or limit max_step. For a linear loop with a limit, ControlLoop.simulate is exact."
         )
     return (
-        f"The right-hand side is not finite from t={run.end!r} on: the solution leaves the "
-        "domain of fun at this time. Check fun for roots, logarithms and divisions, or end "
-        "the run with a terminal event."
+        f"The right-hand side is not finite from t={run.end!r} on, so the solution leaves the "
+        "domain of fun. Check the roots, logarithms and divisions in fun, or end the run with a "
+        "terminal event."
     )
 
 
@@ -287,8 +288,8 @@ def _history(history: Any) -> tuple[Any, Any]:
     if isinstance(history, tuple) and any(callable(part) for part in history):
         if len(history) != 2 or not all(callable(part) for part in history):
             raise TypeError(
-                f"history={history!r}: if history is a pair, both entries must be functions: "
-                "the history and its derivative"
+                f"history={history!r}: a pair must contain two functions, the history and its "
+                "derivative"
             )
         return history
     return np.atleast_1d(_vector("history", history)), None
@@ -302,18 +303,17 @@ def _initial(past: Any, y0: ArrayLike | None, start: float) -> Array:
         return np.asarray(past)
     found = past(start)
     if found is None:
-        raise TypeError(
-            f"history at t={start} returned None: end it with a return statement that gives "
-            "the values"
-        )
+        raise TypeError(f"history returned None at t={start}: let the function return its values")
     value = np.atleast_1d(real_array(f"history at t={start}", found))
     if value.ndim != 1:
         raise ValueError(
-            f"history returned shape {value.shape} at t={start}: give a number or (dim,)"
+            f"history returned an array of shape {value.shape} at t={start}: return a "
+            "number, or an array of shape (dim,)"
         )
     if not np.isfinite(value).all():
         raise ValueError(
-            f"history is {value} at t={start}: give finite values, or give y at the start as y0"
+            f"history is {value} at t={start}: give finite values. If only the start is "
+            "known, give its value as y0"
         )
     return np.ascontiguousarray(value)
 
@@ -325,7 +325,9 @@ def _pattern(pattern: Any, dim: int) -> tuple[list[int], list[int]] | None:
     if not hasattr(pattern, "tocoo"):
         pattern = real_array("jac_sparsity", pattern)
     if pattern.shape != (dim, dim):
-        raise ValueError(f"jac_sparsity has shape {pattern.shape}: give ({dim}, {dim})")
+        raise ValueError(
+            f"jac_sparsity has shape {pattern.shape}: give an array of shape ({dim}, {dim})"
+        )
     rows, columns = pattern.nonzero()
     return rows.tolist(), columns.tolist()
 
@@ -337,12 +339,13 @@ def _events(events: Any) -> list[DelayEvent]:
     found = []
     for event in (events,) if callable(events) else events:
         if not callable(event):
-            raise TypeError(f"events: {event!r} is not a function: give functions")
+            raise TypeError(f"events contains {event!r}, which is not a function: give functions")
         direction = int(np.sign(finite("direction", getattr(event, "direction", 0))))
         terminal = finite("terminal", getattr(event, "terminal", None) or 0)
         if not 0 <= terminal < 2**31 or terminal != int(terminal):
             raise ValueError(
-                f"terminal={terminal}: give True, or the number of the crossing that ends the run"
+                f"terminal={terminal}: give True, or the number of crossings after which the "
+                "run ends"
             )
         found.append(DelayEvent(event, direction, int(terminal)))
     return found
@@ -354,7 +357,9 @@ def _jumps(jumps: Iterable[Any], start: float, end: float) -> list[DelayJump]:
     for jump in jumps:
         time, change = jump if isinstance(jump, tuple) else (jump, None)
         if change is not None and not callable(change):
-            raise TypeError(f"jumps: {change!r} is not a function: give functions of t and y")
+            raise TypeError(
+                f"jumps contains {change!r}, which is not a function: give functions of t and y"
+            )
         found.append(DelayJump(finite("jumps", time), change))
     found.sort(key=lambda jump: jump.time)
     return [jump for jump in found if start < jump.time < end]

@@ -123,7 +123,7 @@ class PlantChoice(ReadOnlyArrays):
         found = []
         for name in sorted(self.criteria, key=lambda name: self.criteria[name]):
             fit = self.estimates[name]
-            ends = "not claimed"
+            ends = "not reliable"
             if fit.verdict == "reliable":
                 low, high = fit.ci(0.95, "delay+lag")
                 span = fit.recording.time[-1] - fit.recording.time[0]
@@ -146,11 +146,11 @@ class PlantChoice(ReadOnlyArrays):
         """What the table means, in sentences."""
         found = ["BIC is less that of the likeliest plant; * was taken; times in s."]
         if self.best.verdict != "reliable":
-            found.append("No plant of the family gives a reliable estimate.")
+            found.append("None of the plants that were tried gives a reliable estimate.")
             return found
         found.append(
-            "Sum of delay and lag, averaged over all plants by their weights: "
-            f"{between(*self.ci(), math.nan, 's')} (95 %)."
+            "Sum of delay and lag, averaged over all plants by their "
+            f"probabilities: {between(*self.ci(), math.nan, 's')} (95 %)."
         )
         return found
 
@@ -254,9 +254,9 @@ def choose_plant(
     loops = [run.loop for run in runs]
     if not all(one.plant.is_rational for one in loops):
         raise ValueError(
-            "the plant has delays inside, but choose_plant fits a gain, lags and a zero "
-            "behind one delay. Give an Integrator() or a FirstOrder() to say whether the "
-            "plant integrates"
+            "the plant has delays inside, but choose_plant fits a gain, "
+            "lags and a zero, all behind one delay. Give an Integrator() "
+            "or a FirstOrder() to say whether the plant integrates"
         )
     estimates: dict[str, DelayEstimate] = {}
     refusals = {}

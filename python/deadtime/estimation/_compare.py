@@ -190,7 +190,7 @@ class Comparison:
         for name, fit in self.estimates.items():
             interval, total = "–", "–"
             if fit.verdict != "reliable":
-                interval, total = "not claimed", f"about {fit.delay_plus_lag:.3f}"
+                interval, total = "not reliable", f"about {fit.delay_plus_lag:.3f}"
             elif fit.calibrated:
                 interval = "{:.3f} – {:.3f}".format(*fit.ci(0.95))
                 total = f"{fit.delay_plus_lag:.3f} ±{fit.stderr['delay+lag']:.3f}"
@@ -223,10 +223,10 @@ class Comparison:
             sentences += _overshoot_against_fit(dominant, plain, IN_WORDS[self.trusted])
         if lagged is not None and lagged.ci(0.95, "lag")[0] > 0.0 and lagged.lag is not None:
             sentences.append(
-                f"The vehicle has a lag: a fit with a lag gives {lagged.delay:.3f} s of delay "
-                f"and {lagged.lag:.3f} s of lag. Part of the apparent dead time is thus the "
-                "dynamics of the vehicle. The recording determines only the sum well, "
-                f"{lagged.delay_plus_lag:.3f} s."
+                f"The vehicle has a lag: a fit with a lag gives {lagged.delay:.3f} "
+                f"s of delay and {lagged.lag:.3f} s of lag. So part of the "
+                "apparent dead time is dynamics of the vehicle. The recording "
+                f"determines only the sum well, {lagged.delay_plus_lag:.3f} s."
             )
         if plain.verdict != "reliable":
             sentences.append(
@@ -262,7 +262,7 @@ def _in_errors(one: MethodDifference) -> str:
     """A difference in standard errors, in brackets."""
     if one.standard_errors is None:
         return ""
-    return f" ({abs(one.standard_errors):.2g} of the standard errors of this difference)"
+    return f" ({abs(one.standard_errors):.2g} standard errors of this difference)"
 
 
 def _signed(value: float | None) -> str:
@@ -283,8 +283,8 @@ def _overshoot_against_fit(dominant: DelayEstimate, plain: DelayEstimate, fit: s
             f"({plain.delay:.3f} s) agree."
         ]
     sentences = [
-        f"The paper's overshoot method says {dominant.delay:.3f} s, {fit} {plain.delay:.3f} s: "
-        f"they differ by {abs(difference):.3f} s."
+        f"The paper's overshoot method gives {dominant.delay:.3f} s, but {fit} "
+        f"gives {plain.delay:.3f} s. The difference is {abs(difference):.3f} s."
     ]
     assumed, gain = dominant.gain, plain.gain
     if assumed is None or gain is None or "gain" not in plain.stderr:
@@ -295,10 +295,10 @@ def _overshoot_against_fit(dominant: DelayEstimate, plain: DelayEstimate, fit: s
             ("weaker", "less", "short") if gain < assumed else ("stronger", "more", "long")
         )
         sentences.append(
-            f"The gain is not {assumed:g}, as the overshoot method assumes, but {gain:.3f} "
-            f"({low:.3f} to {high:.3f}): a {weaker} loop overshoots {less}, and the "
-            f"estimated delay is too {short}. With this gain the same overshoot would mean "
-            f"{dominant.delay * assumed / gain:.3f} s."
+            f"The overshoot method assumes a gain of {assumed:g}, but the gain is "
+            f"{gain:.3f} ({low:.3f} to {high:.3f}). A {weaker} loop overshoots "
+            f"{less}, so the estimated delay is too {short}. With this gain, the "
+            f"same overshoot would mean {dominant.delay * assumed / gain:.3f} s."
         )
     return sentences
 

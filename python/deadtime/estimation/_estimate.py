@@ -281,14 +281,14 @@ def estimate_delay(
     given = [name for name, value in known.items() if value is not None]
     if given:
         raise ValueError(
-            f"{given[0]} is for an estimate without a loop: leave out {given[0]} or the loop"
+            f"{given[0]} is only for an estimate without a loop: leave out {given[0]} or the loop"
         )
     runs = [checked_run(run) for run in paired_runs(recording, loop, window)]
     chosen = method_of(method, (run.recording for run in runs))
     if len(runs) > 1 and not chosen.joint:
         raise ValueError(
-            f"the {chosen.name} method takes one recording, but {len(runs)} are given: fit "
-            f"them together by {' or '.join(map(repr, JOINT))}"
+            f"the {chosen.name} method takes one recording, but {len(runs)} are "
+            f"given: fit the recordings together by {' or '.join(map(repr, JOINT))}"
         )
     if not isinstance(chosen, OutputError) and not all(run.loop.plant.is_linear for run in runs):
         raise ValueError(
@@ -332,7 +332,7 @@ def method_of(method: str | Method, recordings: Iterable[Recording]) -> Method:
         return method
     if not isinstance(method, str):
         raise TypeError(
-            f"method must be a name or an object such as Waveform(), got {type(method).__name__}"
+            f"method must be a name or an object such as Waveform(), not {type(method).__name__}"
         )
     name = automatic_method(recordings) if method == "auto" else method
     if name not in METHODS:

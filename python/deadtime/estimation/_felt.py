@@ -39,7 +39,7 @@ FELT = (
 #: The same in words.
 WORDS = {
     "largest_gain": "largest stable gain",
-    "crossover": "half of it crosses over at",
+    "crossover": "crossover at half this gain",
     "delay_at_crossover": "equivalent delay there",
 }
 
@@ -175,7 +175,7 @@ class Felt:
         given = one_dimensional("omega", np.atleast_1d(np.asarray(omega, dtype=float)))
         bad = given[~(given > 0.0)]
         if bad.size:
-            raise ValueError(f"omega={bad[0]:g} rad/s: give a frequency above zero")
+            raise ValueError(f"omega={bad[0]:g} rad/s: give frequencies above zero")
         if not self.loop.plant.is_linear:
             raise ValueError(
                 "the plant limits the rate of its command, so the plant is not linear and has "

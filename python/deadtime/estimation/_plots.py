@@ -74,7 +74,7 @@ def plot_estimate(fit: DelayEstimate, axes: Sequence[Axes] | None = None) -> lis
 def _check_axes(axes: Sequence[Axes], count: int) -> None:
     """Refuse another number of axes, and bare those of the right one."""
     if len(axes) != count:
-        raise ValueError(f"ax holds {len(axes)} axes: give {count}")
+        raise ValueError(f"ax has {len(axes)} axes: give {count} matplotlib axes")
     for one in axes:
         bare_axes(one)
 

@@ -219,18 +219,18 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
         from scipy import special
 
         if not 0.0 < level < 1.0:
-            raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
+            raise ValueError(f"level={level!r} is not between 0 and 1: give a level such as 0.95")
         if not self.calibrated:
             raise ValueError(f"no interval: {self.uncalibrated}")
         if name in FELT:
             if not math.isfinite(self.crossover):
                 raise ValueError(
-                    f"no interval of {name}: no proportional gain makes the loop unstable"
+                    f"{name} has no interval, because no proportional gain makes the loop unstable"
                 )
             return self._felt_interval(level, name)
         if name not in self.stderr:
             raise ValueError(
-                f"{name!r} was not fitted; there are intervals only for {', '.join(self.stderr)}"
+                f"{name!r} was not fitted. There are intervals only for {', '.join(self.stderr)}"
             )
         value, beside = self._value(name), self._added(name)
         if self._profile is not None and self._profile.preferred:
@@ -282,7 +282,7 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
         interval = self.ci() if known else None
         loop = self.loop if controller is None else self.loop.replace(controller=controller)
         page = explorer_of(loop.specification, ranges, interval)
-        return page if reliable else replace(page, title="A fitted loop, an indication")
+        return page if reliable else replace(page, title="A fitted loop (only an indication)")
 
     def profile(self, name: str = "delay", values: ArrayLike | None = None) -> tuple[Array, Array]:
         """Profile likelihood: the increase of the cost when one quantity is held.
@@ -307,12 +307,12 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
         """
         if self._profile is None:
             raise ValueError(
-                f"the {self.method} method has no profile; only 'output_error' and 'waveform' "
-                "have profiles"
+                f"the {self.method} method gives no profile "
+                "likelihood. Use method='output_error' or 'waveform'"
             )
         if name not in self.stderr:
             raise ValueError(
-                f"{name!r} was not fitted; there are profiles only for {', '.join(self.stderr)}"
+                f"{name!r} was not fitted. There are profiles only for {', '.join(self.stderr)}"
             )
         if values is None:
             middle, reach = self._value(name), 4.0 * self._reach(name)
@@ -488,8 +488,8 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
         lines += self._felt_lines()
         kind = "white" if self.whiteness.white else "coloured"
         lines.append(
-            f"  residuals {self.rms:.4g} rms, {kind} (lag-1 autocorrelation "
-            f"{self.whiteness.autocorrelation:.2f})"
+            f"  residuals with an rms of {self.rms:.4g}, {kind} (lag-1 "
+            f"autocorrelation {self.whiteness.autocorrelation:.2f})"
         )
         return lines
 
@@ -513,7 +513,7 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
         if math.isfinite(omega):
             view = self.at(omega)
             line += (
-                f"; at {omega:.3g} rad/s, the highest frequency of the command: gain "
+                f". At {omega:.3g} rad/s, the highest frequency of the command: gain "
                 f"{rough(view.gain[0])}, equivalent delay {rough(view.delay[0], 's')}"
             )
         return [line]

@@ -79,16 +79,16 @@ class SharedNumber:
             ends = f"{100.0 * self.level:g} %: {between(low, high, error, unit)}; "
         text = (
             f"{self.verdict}: {self.name} of {len(self.estimates)} estimates "
-            f"{claimed(self.verdict, self.value, error, unit)} "
-            f"({ends}such differences, or larger: p = {self.p_value:.2g})"
+            f"{claimed(self.verdict, self.value, error, unit)} ({ends}probability "
+            f"of such differences or larger: p = {self.p_value:.2g})"
         )
         if not self.agree:
             each = ", ".join(shown(one, error, unit) for one in self.estimates)
-            return f"{text}; they contradict one another: {each}"
+            return f"{text}. The estimates contradict one another: {each}"
         return (
             text
             if self.verdict == "reliable"
-            else (f"{text}; one of the estimates is only an indication")
+            else (f"{text}. One of the estimates is only an indication")
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -147,10 +147,10 @@ def shared_number(
 
     if len(estimates) < 2:
         raise ValueError(
-            f"{len(estimates)} estimates were given: a shared number needs two or more"
+            f"{len(estimates)} estimates were given: a shared parameter needs two or more"
         )
     if not 0.0 < level < 1.0:
-        raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
+        raise ValueError(f"level={level!r} is not between 0 and 1: give a level such as 0.95")
     ends = [one.ci(level, name) for one in estimates]
     values = [one._value(name) for one in estimates]
     known: dict[float, float] = {}
@@ -205,4 +205,4 @@ def _end(excess: Callable[[float], float], start: float, step: float, floor: flo
         if far == floor:
             return floor
         near, step = far, 1.5 * step
-    raise ValueError(f"no end of the interval was found from {start:.6g} to {near:.6g}")
+    raise ValueError(f"from {start:.6g} to {near:.6g} no end of the interval was found")

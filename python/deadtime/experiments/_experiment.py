@@ -95,17 +95,17 @@ class Experiment(ReadOnlyArrays):
         reference = one_dimensional("reference", reference).copy()
         if reference.shape != time.shape:
             raise ValueError(
-                f"reference has {reference.size} values and time {time.size}: give one value for "
-                "each time"
+                f"reference has {reference.size} values, but time has {time.size}: give one "
+                "value for each time"
             )
         if time.size < MINIMUM_SAMPLES:
             raise ValueError(
-                f"time has {time.size} samples, at least {MINIMUM_SAMPLES} are needed: give a "
-                "longer duration"
+                f"time has {time.size} samples, but at least {MINIMUM_SAMPLES} are needed: give "
+                "a longer duration"
             )
         if not np.isfinite(reference).all():
             wrong = reference[~np.isfinite(reference)][0]
-            raise ValueError(f"reference holds {wrong}: give finite values")
+            raise ValueError(f"reference contains {wrong}: give finite values")
         held = {"time": read_only(time), "reference": read_only(reference), "name": name}
         for label, number in (("relay_amplitude", relay_amplitude), ("period", period)):
             held[label] = None if number is None else positive(label, number)
@@ -156,8 +156,8 @@ class Experiment(ReadOnlyArrays):
         begin = non_negative("rest", rest)
         if begin >= time[-1]:
             raise ValueError(
-                f"rest={begin} s: the step would come after the end at {time[-1]:g} s; give a "
-                "shorter rest"
+                f"rest={begin} s: the step would come after the end, which is at {time[-1]:g} "
+                "s. Give a shorter rest"
             )
         height = finite("amplitude", amplitude)
         reference = np.where(time < begin - ON_A_SAMPLE * sample_time, 0.0, height)
@@ -197,7 +197,7 @@ class Experiment(ReadOnlyArrays):
         return cls(
             time,
             finite("amplitude", amplitude) * signs,
-            name=f"square of {amplitude:g}, {hold:g} s hold",
+            name=f"square wave of ±{amplitude:g} that changes every {hold:g} s",
             period=whole_period(2.0 * hold, sample_time),
         )
 
@@ -295,8 +295,8 @@ class Experiment(ReadOnlyArrays):
         if whole_period(positive("period", period), sample) is None:
             near = max(1, round(period / sample)) * sample
             raise ValueError(
-                f"period={period} s is not a whole number of samples of {sample} s, so the "
-                f"wave would not be periodic: give {near:.10g}, for example"
+                f"period={period} s is not a whole number of samples of {sample} s, so the wave "
+                f"would not be periodic. Give {near:.10g}, for example"
             )
         count = round(period / sample)
         excited = excited_lines(lines, count, odd)
@@ -305,7 +305,7 @@ class Experiment(ReadOnlyArrays):
         return cls(
             np.arange(repeated.size) * sample,
             repeated,
-            name=f"multisine of {amplitude:g}, {excited.size} lines",
+            name=f"multisine with an amplitude of {amplitude:g} and {excited.size} lines",
             period=count * sample,
         )
 
@@ -380,16 +380,16 @@ class Experiment(ReadOnlyArrays):
             if (missed > ON_A_SAMPLE * loop.sample_time).any():
                 raise ValueError(
                     f"the experiment has a sample every {np.median(np.diff(self.time)):g} s, "
-                    f"but the loop every {loop.sample_time:g} s: make the experiment with "
-                    f"sample_time={loop.sample_time:g}"
+                    f"but the loop has a sample every {loop.sample_time:g} s: make the "
+                    f"experiment with sample_time={loop.sample_time:g}"
                 )
         loop = loop.replace(delay_path="command")
         if self.relay_amplitude is None:
             return loop
         if loop.limit is not None and loop.limit < self.relay_amplitude:
             raise ValueError(
-                f"a relay of {self.relay_amplitude:g} exceeds the limit of the command, "
-                f"{loop.limit:g}: give an amplitude up to this limit"
+                f"the relay's command of {self.relay_amplitude:g} exceeds the limit of the "
+                f"command, {loop.limit:g}: give an amplitude up to this limit"
             )
         gain = RELAY_GAIN * self.relay_amplitude
         return loop.replace(controller=P(gain), limit=self.relay_amplitude)

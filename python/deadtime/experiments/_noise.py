@@ -84,7 +84,7 @@ class FlightNoise:
     >>> from deadtime.experiments import FlightNoise
     >>> gusts = FlightNoise(white=0.005, air=0.1, air_time=0.3)
     >>> print(gusts)
-    white noise of 0.005, air of 0.1 over 0.3 s
+    white noise of 0.005, wind (air) of 0.1 with a time constant of 0.3 s
     >>> loop = dtm.ControlLoop(
     ...     dtm.Integrator(0.85), dtm.P(1.6), delay=0.3, sample_time=0.065, limit=1.0
     ... )
@@ -117,14 +117,17 @@ class FlightNoise:
     def __str__(self) -> str:
         parts = [f"white noise of {self.white:.3g}"]
         if self.air:
-            parts.append(f"air of {self.air:.3g} over {self.air_time:.2g} s")
+            parts.append(
+                f"wind (air) of {self.air:.3g} with a time constant of {self.air_time:.2g} s"
+            )
         if self.air_walk:
-            parts.append(f"air that walks by {self.air_walk:.3g} per root of a second")
+            parts.append(f"wind (air) that walks by {self.air_walk:.3g} per root of a second")
         if self.trim:
             parts.append(f"trim of {self.trim:.3g}")
         if self.sensor:
             parts.append(
-                f"coloured sensor noise of {self.sensor:.3g} over {self.sensor_time:.2g} s"
+                f"coloured sensor noise of {self.sensor:.3g} with a time constant of "
+                f"{self.sensor_time:.2g} s"
             )
         return ", ".join(parts)
 

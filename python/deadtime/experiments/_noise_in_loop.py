@@ -43,8 +43,8 @@ def check_reads_samples(loop: ControlLoop) -> None:
     else:
         return
     raise ValueError(
-        f"{why} acts on the effect of wind (air) between the samples, which is not computed: "
-        f"{advice}, or leave air and trim out of the noise"
+        f"{why} responds to wind (air) between the samples, and this response cannot be "
+        f"computed: {advice}, or leave air and trim out of the noise"
     )
 
 
@@ -57,20 +57,20 @@ def reference_shift(error: Array, loop: ControlLoop) -> Array:
         return error
     if smooth is None:
         raise ValueError(
-            "noise has no ideal derivative: give the controller a DerivativeFilter, or use "
-            "noise_in_loop=False"
+            "the ideal derivative of noise does not exist: give the controller a "
+            "DerivativeFilter, or use noise_in_loop=False"
         )
     if not isinstance(controller, PV):
         return error
     if loop.sample_time is None:
         raise ValueError(
-            "noise through the filter of a PV controller is computed on samples only: give "
+            "noise through the filter of a PV controller can be computed only on samples: give "
             "the loop a sample_time, or use noise_in_loop=False"
         )
     if controller.Kp == 0.0:
         raise ValueError(
-            "Kp=0: the reference has no effect, so noise cannot be added to it. Give a Kp "
-            "other than zero, or use noise_in_loop=False"
+            "with Kp=0 the reference has no effect, so noise cannot be added to the reference. "
+            "Give another Kp, or use noise_in_loop=False"
         )
     return error + slope / controller.Kp * _derivative(error, smooth, loop.sample_time)
 

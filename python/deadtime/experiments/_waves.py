@@ -40,8 +40,9 @@ def sample_times(duration: float, sample_time: float) -> Array:
         )
     if count > MOST_SAMPLES:
         raise ValueError(
-            f"duration={duration} s is {count:.3g} samples of {sample} s, more than "
-            f"{MOST_SAMPLES}: give a shorter duration, and check that its unit is seconds"
+            f"duration={duration} s is {count:.3g} samples of {sample} s, but at most "
+            f"{MOST_SAMPLES} are possible: give a shorter duration, and check that the duration "
+            "is in seconds"
         )
     return np.arange(np.ceil(count - ON_A_SAMPLE), dtype=np.float64) * sample
 
@@ -50,7 +51,7 @@ def hold_numbers(time: Array, hold: float, sample_time: float) -> Whole:
     """Index of the hold interval of each sample."""
     if positive("hold", hold) < sample_time * (1.0 - ON_A_SAMPLE):
         raise ValueError(
-            f"hold={hold} s is shorter than a sample of {sample_time} s: give a longer hold"
+            f"hold={hold} s is shorter than a sample, which is {sample_time} s: give a longer hold"
         )
     return np.floor((time + ON_A_SAMPLE * sample_time) / hold).astype(np.int64)
 
@@ -77,7 +78,8 @@ def excited_lines(lines: int | Sequence[int], count: int, odd: bool) -> Whole:
         found = found[found % 2 == 1]
     if found.size == 0:
         raise ValueError(
-            f"lines={lines!r} contains no {'odd ' if odd else ''}harmonic: give one or more"
+            f"lines={lines!r} contains no {'odd ' if odd else ''}harmonic: give at least one "
+            f"{'odd ' if odd else ''}harmonic"
         )
     return found.astype(np.int64)
 

@@ -59,10 +59,10 @@ STEP_COLUMNS = (
     "step at / s",
     "robust gains: overshoot / %",
     "settled / s",
-    "gains that follow: overshoot / %",
+    "gains that follow the delay: overshoot / %",
     "settled / s",
     "delay at the step / s",
-    "gains for up to / s",
+    "gains for delays up to / s",
 )
 
 
@@ -127,14 +127,14 @@ class AdaptiveStudy:
         """The outcome in a few lines."""
         robust, adaptive = self.errors
         used = ", ".join(
-            f"up to {one.delays[1]:.3g} s {100.0 * share:.0f} %"
+            f"{100.0 * share:.0f} % in the set for delays up to {one.delays[1]:.3g} s"
             for one, share in zip(self.schedule.sets, self.shares, strict=True)
         )
         return [
             *self.schedule.summary().splitlines(),
-            f"mean absolute error: {1e3 * robust:.1f} thousandths with the robust gains, "
+            f"mean absolute error in thousandths: {1e3 * robust:.1f} with the robust gains, "
             f"{1e3 * adaptive:.1f} with gains that follow the delay",
-            f"time in each set: {used}",
+            f"share of the time: {used}",
         ]
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -195,8 +195,8 @@ def schedule_of(
     loop = ControlLoop(plant, controller, sample_time=plan.sample_time, limit=largest)
     if fit.delay >= adapt.longest:
         raise NotProvedError(
-            f"the delay was estimated as {fit.delay:.3g} s, but gains are to be proved only "
-            f"up to {adapt.longest:g} s: prove them up to a longer delay"
+            f"the delay was estimated as {fit.delay:.3g} s, but --adapt proves gains only up to "
+            f"{adapt.longest:g} s: give a longer delay"
         )
     return adaptive_gains(
         loop,

@@ -42,7 +42,7 @@ class ScheduledControl(AxisControl):
     def __init__(self, schedule: GainSchedule) -> None:
         controller = schedule.loop.controller
         if not isinstance(controller, (P, PV)):
-            raise TypeError(f"controller={controller!r}: give a schedule for P or PV")
+            raise TypeError(f"controller={controller!r}: give a schedule of gains for P or PV")
         smoothing = getattr(controller, "filter", None)
         super().__init__(controller, schedule.proof.sample_time, smoothing or PAPER_FILTER)
         self._filtered = smoothing is not None

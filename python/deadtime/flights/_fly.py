@@ -142,7 +142,9 @@ def fly_axes(
     report = stage_report(progress)
     names = [plan.axis for plan in plans]
     if not names or len(set(names)) < len(names):
-        raise ValueError(f"axes {', '.join(names) or 'none'}: give one or more axes, each once")
+        raise ValueError(
+            f"axes={', '.join(names) or 'none'}: give one or more axes, and each only once"
+        )
     for plan in plans:
         plan.check()
     _check_folder(folder)
@@ -224,7 +226,7 @@ def _check_axes(vehicle: Vehicle, axes: Sequence[str]) -> None:
     missing = [axis for axis in axes if axis not in vehicle.axes]
     if missing:
         raise ValueError(
-            f"the vehicle takes no speed commands on the axis {', '.join(missing)}, only on "
+            f"the vehicle accepts no speed commands on the axis {', '.join(missing)}, only on "
             f"{', '.join(vehicle.axes)}"
         )
 

@@ -87,24 +87,25 @@ class Learned:
         found = []
         if self.irregular:
             found.append(
-                f"The times of the flights are irregular ({'; '.join(self.irregular)}), so "
-                "the estimate is only an indication: repeat the experiment on a computer "
-                "without other work."
+                "The times between samples were irregular in flight "
+                f"({'; '.join(self.irregular)}), so the estimate is only an indication. Repeat "
+                "the experiment on a computer without other work."
             )
         if self.split is not None and not self.adds_up:
             parts = self.split.transport.delay + self.split.vehicle_delay
             found.append(
-                f"From the vehicle's reports, link and vehicle take {rough(parts, 's')}; from "
-                f"command and output, {rough(self.whole_delay, 's')}. The two differ by more "
-                "than their intervals allow, so the estimate is only an indication."
+                f"By the vehicle's reports, link and vehicle together take {rough(parts, 's')}. "
+                f"By the fit to command and output, they take {rough(self.whole_delay, 's')}. "
+                "The difference is larger than their intervals allow, so the estimate is only "
+                "an indication."
             )
         if self.fit.verdict != "reliable":
             found.append(
-                "The fit is an indication: its residuals are more than noise of the sensor, for "
-                f"example wind, or the vehicle is no such plant ({self.fit.reason}). The gains "
-                "were designed for its intervals, which may be too narrow, so their margin is not "
-                "assured. Fly such gains only with space around the vehicle, and repeat the "
-                "experiment without wind."
+                "The estimate is only an indication, because the fit does not explain the "
+                f"flights ({self.fit.reason}). The cause may be wind, or a plant of another "
+                "kind. The gains were designed for intervals that may be too narrow, so their "
+                "margins are not certain. Fly these gains only with free space around the "
+                "vehicle, and repeat the experiment without wind."
             )
         return found
 
@@ -189,7 +190,7 @@ def _split(flights: Sequence[FlownSteps]) -> tuple[DelaySplit | None, str]:
     read = [read_telemetry(one) for one in flights]
     messages = [one for one in read if one is not None]
     if not messages or len(messages) < len(flights):
-        return None, "the vehicle does not report which setpoint it follows and how fast it moves"
+        return None, "the vehicle does not report its setpoint and its speed"
     try:
         return split_delay(messages), ""
     except NotIdentifiableError as refusal:

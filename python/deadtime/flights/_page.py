@@ -67,7 +67,10 @@ def _verdict(studies: Sequence[FlightStudy]) -> str:
     sentences = [study.outcome() for study in studies]
     doubtful = [study.axis.name for study in studies if study.learned.verdict != "reliable"]
     if doubtful:
-        sentences.append(f"Indications: the estimates of {', '.join(doubtful)}; see below.")
+        sentences.append(
+            f"The estimates of these axes are only indications: {', '.join(doubtful)}. The "
+            "reasons are below."
+        )
     return " ".join(sentences)
 
 
@@ -102,12 +105,12 @@ def _described(studies: Sequence[FlightStudy], vehicle: str) -> str:
         largest = plan.limits.largest(axis)
         flown.append(
             f"steps of the {axis.words} by {plan.step:g} {axis.unit} under P control with Kp = "
-            f"{gains}, commands limited to {largest:g} {axis.rate_unit}"
+            f"{gains}, and commands of at most {largest:g} {axis.rate_unit}"
         )
     count = sum(len(study.flights) for study in studies)
     return (
-        f"{count} flights of {vehicle}: {'; '.join(flown)}; then under the gains that were "
-        "designed from these."
+        f"{count} flights of {vehicle}: {'; '.join(flown)}, and then flights with the gains "
+        "that were designed from these."
     )
 
 
@@ -122,28 +125,28 @@ def _fitted(study: FlightStudy) -> str:
     fit = learned.fit
     small = study.axis.thousandth
     words = (
-        f"The residuals of the fit of all flights together are {1e3 * fit.rms:.1f} {small} (gain "
-        f"{stated(fit.gain or 0.0, fit.stderr['gain'])}); "
+        f"The residuals of the fit to all flights have an rms of {1e3 * fit.rms:.1f} {small} "
+        f"(gain {stated(fit.gain or 0.0, fit.stderr['gain'])}). "
         + (
-            "they are no more than noise of the sensor and of the air."
+            "They are no larger than noise of sensor and wind."
             if fit.verdict == "reliable"
-            else "they are more than noise, so the intervals are an indication only."
+            else "They are larger than noise, so the intervals are only an indication."
         )
     )
     if len(learned.tried) > 1:
-        words += f" Plants that were tried: {'; '.join(one.line(small) for one in learned.tried)}."
+        words += f" These plants were tried: {'; '.join(one.line(small) for one in learned.tried)}."
     ages = [one.age for one in learned.flights]
     if all(age is not None for age in ages):
         mean = sum(age for age in ages if age is not None) / len(ages)
         words += (
-            " Outputs are taken at the times of the vehicle's clock. When a command was computed, "
-            f"they were on average {1e3 * mean:.0f} ms older than on the arrival of a fast "
-            "message. This is part of the delay."
+            " Each output has the time of the vehicle's clock. When a command was computed, "
+            f"the output was on average {1e3 * mean:.0f} ms older than an output from a fast "
+            "message. This age is part of the delay."
         )
     if learned.split is None:
         words += (
-            " How much of the delay belongs to the link and how much to the vehicle is not "
-            f"known: {learned.unsplit}."
+            " It is not known how much of the delay belongs to the link and how much to the "
+            f"vehicle: {learned.unsplit}."
         )
     return words
 

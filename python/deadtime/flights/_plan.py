@@ -41,13 +41,13 @@ class FlightPlan:
     step : float
         Size of the steps, m or rad.
     base : float
-        Height the steps go up from, m.
+        Height from which the steps go up, m.
 
         On another axis than z: from where the vehicle took off, m or rad.
     settle : float
         Time at the base before the first step, s.
     hold : float
-        Time on each step that is learnt from, s.
+        Duration of each step in the flights for the estimate, s.
     checked_hold : float
         Time on each step of the flights with designed gains, s.
     sample_time : float
@@ -71,7 +71,7 @@ class FlightPlan:
     Traceback (most recent call last):
     ValueError: Kp = 4 is above 2.47, half of the stability limit with a delay of 0.36 s and a gain
     of \
-0.885: fly a smaller gain
+0.885: give a smaller gain
     """
 
     gains: tuple[float, ...] = (1.2, 2.4)
@@ -107,7 +107,7 @@ class FlightPlan:
             If there is no such axis.
         """
         if axis not in USUAL:
-            raise ValueError(f"there is no axis {axis!r}: there are {', '.join(USUAL)}")
+            raise ValueError(f"the axis {axis!r} does not exist: give one of {', '.join(USUAL)}")
         usual = AUTOPILOT if autopilot and axis == "z" else USUAL[axis]
         return cls(**{"axis": axis, **usual, **changes})
 
@@ -142,14 +142,16 @@ class FlightPlan:
             would exceed the limits.
         """
         if self.axis not in AXES:
-            raise ValueError(f"there is no axis {self.axis!r}: there are {', '.join(AXES)}")
+            raise ValueError(
+                f"the axis {self.axis!r} does not exist: give one of {', '.join(AXES)}"
+            )
         if not self.gains:
-            raise ValueError("there are no gains to fly: give one or more")
+            raise ValueError("gains is empty: give one or more gains to fly")
         axis = self.flown_axis
         if positive("step", self.step) < LEAST_STEP:
             raise ValueError(
-                f"step={self.step:g} {axis.unit} is within the noise of the {axis.words}: fly "
-                f"steps of {LEAST_STEP:g} {axis.unit} or more"
+                f"step={self.step:g} {axis.unit} is as small as the noise of the {axis.words}: "
+                f"give a step of {LEAST_STEP:g} {axis.unit} or more"
             )
         for Kp in self.gains:
             check_gain(Kp, self.prior_delay, self.prior_gain)
@@ -161,8 +163,8 @@ class FlightPlan:
         gains = ", ".join(f"{Kp:g}" for Kp in self.gains)
         where = f"from {self.base:g} {axis.unit} " if axis.absolute else f"of the {axis.words} "
         return (
-            f"{self.flights} flights: steps of {self.step:g} {axis.unit} {where}under P "
-            f"control with Kp = {gains}, then under gains designed from these"
+            f"{self.flights} flights with steps of {self.step:g} {axis.unit} {where}under P "
+            f"control with Kp = {gains}, then flights with gains designed from these"
         )
 
     def lines(self) -> list[str]:

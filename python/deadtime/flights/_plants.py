@@ -67,12 +67,12 @@ def candidates(axis: Axis, shaping: Shaping | None) -> Iterator[tuple[str, Plant
     yield "an integrator with a lag", Integrator(1.0, lag=LAG), USUAL
     if shaping is None:
         limited = RateLimited(Integrator(1.0, lag=LAG), RATE)
-        yield "the same behind a limit of acceleration", limited, (*USUAL, "rate")
+        yield "an integrator with a lag and a limit of acceleration", limited, (*USUAL, "rate")
         return
     rate, jerk = shaping
     limits = f"an acceleration of {rate:g}" + ("" if jerk is None else f" and a jerk of {jerk:g}")
     yield (
-        f"the same behind the vehicle's limits, {limits}",
+        f"an integrator with a lag and the limits of the vehicle, {limits}",
         RateLimited(Integrator(1.0, lag=LAG), rate, jerk),
         USUAL,
     )
@@ -80,7 +80,7 @@ def candidates(axis: Axis, shaping: Shaping | None) -> Iterator[tuple[str, Plant
         return
     overshoots = FactoredPlant(LAGS, zero=ZERO, integrator=True)
     yield (
-        "an integrator, two lags and a zero behind these limits",
+        "an integrator with two lags, a zero and the limits of the vehicle",
         RateLimited(overshoots, rate, jerk),
         ("delay", "gain", "lag_1", "lag_2", "zero"),
     )

@@ -66,7 +66,7 @@ def plot_telemetry(
     upper.set(ylabel=f"speed / ({flight.axis.rate_unit})")
     upper.legend(frameon=False, fontsize="small")
     lower.plot(time, telemetry.output[came], color="0.35", lw=1.2)
-    lower.set(xlabel="time since the step / s", ylabel=_output(flight))
+    lower.set(xlabel="time after the step / s", ylabel=_output(flight))
     return axes
 
 
@@ -97,7 +97,7 @@ def plot_checked(axes: Sequence[Axes], flights: Sequence[FlownSteps]) -> Sequenc
     upper.set(ylabel=_output(flights[0]))
     upper.legend(frameon=False, fontsize="small", loc="lower right")
     unit = flights[0].axis.rate_unit
-    lower.set(xlabel="time since the step / s", ylabel=f"command / ({unit})")
+    lower.set(xlabel="time after the step / s", ylabel=f"command / ({unit})")
     return axes
 
 

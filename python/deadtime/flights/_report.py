@@ -116,7 +116,7 @@ def fly_and_report(
     """
     check_pages()
     if any(folder.glob("flight-*.csv")):
-        raise ValueError(f"{folder} holds recordings already: name another folder")
+        raise ValueError(f"{folder} contains recordings already: give another folder")
     report = stage_report(progress)
     connect, run, moving = vehicle.connect, vehicle.run, vehicle.moving
     try:

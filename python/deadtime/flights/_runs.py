@@ -185,9 +185,8 @@ class FlownSteps:
         clock, timing = self.clock, self.timing
         if clock is not None and not clock.even:
             return (
-                f"the vehicle's clock deviated by {1e3 * clock.misfit:.0f} ms from a steady "
-                "rate against the clock of this computer: one of the two stood still or ran "
-                "slowly"
+                f"the vehicle's clock deviated by {1e3 * clock.misfit:.0f} ms from the clock of "
+                "this computer, so one of the two stopped or ran slowly for a time"
             )
         samples = len(self.recording) + timing.missed
         if timing.missed > MISSED * samples:

@@ -116,13 +116,13 @@ class StepProgramme:
         most, unit, step = limits.error_of(axis), axis.unit, self.largest_step
         if step + MARGIN > most:
             raise ValueError(
-                f"a step of {step:g} {unit} exceeds the error that ends a flight, {most:g} {unit}: "
-                f"fly steps of {most - MARGIN:g} {unit} or less"
+                f"a step of {step:g} {unit} exceeds the largest error that is allowed in "
+                f"flight, {most:g} {unit}: give a step of {most - MARGIN:g} {unit} or less"
             )
         if self.sample_time >= limits.command_age:
             raise ValueError(
-                f"sample_time={self.sample_time:g} s is not below the {limits.command_age:g} s "
-                "for which a command is valid: use a shorter sample time"
+                f"sample_time={self.sample_time:g} s is not below {limits.command_age:g} s, the "
+                "time for which a command is valid: give a shorter sample time"
             )
         if axis.wraps:
             return
@@ -133,8 +133,9 @@ class StepProgramme:
             for end in (reference - step, reference + step):
                 if not low <= end <= high:
                     raise ValueError(
-                        f"a reference of {reference:g} m with steps of {step:g} m may come to "
-                        f"{end:g} m, outside {low:g} to {high:g} m: fly smaller steps, or elsewhere"
+                        f"with a reference of {reference:g} m and steps of {step:g} m, the "
+                        f"vehicle may come to {end:g} m, outside of {low:g} to {high:g} m: give "
+                        "smaller steps, or another reference"
                     )
 
 
@@ -157,7 +158,7 @@ def check_gain(Kp: float, delay: float, gain: float) -> None:
     if not 0.0 < positive("Kp", Kp) <= most:
         raise ValueError(
             f"Kp = {Kp:g} is above {most:.3g}, half of the stability limit with a delay of "
-            f"{delay:g} s and a gain of {gain:g}: fly a smaller gain"
+            f"{delay:g} s and a gain of {gain:g}: give a smaller gain"
         )
 
 
@@ -211,8 +212,8 @@ async def fly_steps(
     if distance + MARGIN > most:
         raise FlightAbortedError(
             f"the vehicle hovers at {value:.2f} {axis.unit}. Its distance to the first "
-            f"reference, {base:g} {axis.unit}, exceeds the error that ends a flight, {most:g} "
-            f"{axis.unit}. Begin closer to this reference"
+            f"reference, {base:g} {axis.unit}, exceeds the largest error that is allowed, "
+            f"{most:g} {axis.unit}. Begin closer to this reference"
         )
     error = min(most, GROWTH * max(programme.largest_step, distance) + MARGIN)
     stricter = replace(limits, max_error=error, max_heading_error=error)
@@ -224,7 +225,7 @@ async def fly_steps(
             state = await vehicle.state()
             if not state.flying:
                 raise FlightAbortedError(
-                    "the vehicle is not flying any more, although no landing was commanded"
+                    "the vehicle is not flying any more, but no landing was commanded"
                 )
             time = now()
             reference = programme.reference(sample * programme.sample_time)

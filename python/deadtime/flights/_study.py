@@ -95,9 +95,9 @@ class FlightStudy:
             parts.append(f"a lag of {said('lag')}")
         beside = ""
         if isinstance(fit.loop.plant, RateLimited):
-            beside = " beside the limits within which the vehicle follows a command"
+            beside = " besides the limits within which the vehicle follows a command"
             if slow := lag_of_limits(fit):
-                beside += f", which are a further lag of {slow:g} s for small ones"
+                beside += f". For small commands, these limits act like a further lag of {slow:g} s"
         sentences = [
             f"{self.verdict.capitalize()}: the delay of the loop on {self.axis.name}, lag "
             f"included, is {said('delay+lag')}, {ends}{beside}: {' and '.join(parts)}, at a gain "
@@ -108,12 +108,12 @@ class FlightStudy:
             link = _claimed_part(split.transport, "delay")
             own = _claimed_part(split.vehicle, split.late)
             sentences.append(
-                f"According to the vehicle's reports, {link} of it is the link and {own} the "
-                "vehicle."
+                f"According to the vehicle's reports, the link takes {link} of this delay, and "
+                f"the vehicle {own}."
             )
         before, after = self.before, self.after
         sentences.append(
-            f"A step {_did(before)} under {before.name}, and {_did(after)} under {after.name}."
+            f"With {before.name}, a step {_did(before)}. With {after.name}, a step {_did(after)}."
         )
         return " ".join(sentences)
 
@@ -146,7 +146,7 @@ class FlightStudy:
         ]
         speed = self.axis.rate.replace("_", " ")
         if split is not None:
-            lines.append(_part(split.transport, "delay", "link, from the setpoint it echoes"))
+            lines.append(_part(split.transport, "delay", "link, from the reported setpoint"))
             lines.append(_part(split.vehicle, split.late, f"vehicle, from setpoint to {speed}"))
         return lines
 

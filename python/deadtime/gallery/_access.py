@@ -117,7 +117,7 @@ def problem(key: str) -> Problem:
     except KeyError:
         near = difflib.get_close_matches(str(key), _problems(), n=3, cutoff=0.3) or names()
         raise KeyError(
-            f"there is no problem {key!r} in the gallery: there is {', '.join(near)}"
+            f"the gallery has no problem {key!r}. Similar names are {', '.join(near)}"
         ) from None
 
 

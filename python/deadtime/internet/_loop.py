@@ -90,16 +90,16 @@ def run_internet_loop(
         for index, gain in enumerate(gains)
     ]
     if mode not in get_args(Mode):
-        raise ValueError(f"mode={mode!r} is not one of {', '.join(get_args(Mode))}")
+        raise ValueError(f"mode={mode!r}: give one of {', '.join(get_args(Mode))}")
     unknown = set(methods) - set(METHODS)
     if unknown:
-        raise ValueError(f"methods {sorted(unknown)} are none of {', '.join(METHODS)}")
+        raise ValueError(
+            f"methods {sorted(unknown)} do not exist: give some of {', '.join(METHODS)}"
+        )
     stems = [f"{index + 1:02d}-gain-{one.gain:g}-" for index, one in enumerate(trials)]
     for file in [] if folder is None else [folder / f"{a}{b}.csv" for a in stems for b in ENDS]:
         if file.exists():  # refused before the first run
-            raise FileExistsError(
-                EEXIST, "the file exists already; choose another folder", str(file)
-            )
+            raise FileExistsError(EEXIST, "the file exists already: give another folder", str(file))
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
     runs = []

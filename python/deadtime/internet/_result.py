@@ -220,35 +220,36 @@ class InternetLoop:
     def explanation(self) -> list[str]:
         """Comparison of the estimates with the measured delay, in sentences."""
         if not math.isfinite(self.age):
-            return ["In one run no command arrived in time, so no delay was measured."]
+            return ["In one run no command arrived in time, so the delay could not be measured."]
         budgets = [run.budget() for run in self.runs]
         mean = {name: 1e3 * float(np.mean([one[name] for one in budgets])) for name in budgets[0]}
         sentences = [
-            f"Measured, the command in force is {1e3 * self.age:.1f} ms old on average: "
-            f"{mean['round trip']:.1f} ms of round trip, {mean['held']:.1f} ms until the "
-            f"controller answers, {mean['hold']:.1f} ms because a command holds for a sample "
-            f"time. The rest, {mean['waiting']:.1f} ms, is for packets that were lost, overtaken "
-            "or buffered, and for processes that wake up late. It is below zero where the newest "
-            "packets are faster than the average."
+            f"By measurement, the command in use is {1e3 * self.age:.1f} ms old on average. The "
+            f"round trip takes {mean['round trip']:.1f} ms, the controller {mean['held']:.1f} "
+            f"ms, and the hold of a command for a sample time {mean['hold']:.1f} ms. The rest, "
+            f"{mean['waiting']:.1f} ms, comes from packets that were lost, overtaken or "
+            "buffered, and from processes that wake up late. The rest is negative if the "
+            "newest packets are faster than the average."
         ]
         unsteady = [run for run in self.runs if run.is_unsteady]
         if unsteady:
             sentences.append(
-                "The delay is not constant: a step contains few of its values, and the "
-                "interval of a single fit is for these only. For the mean delay use the "
-                "intervals of the replayed steps, or make the delay constant with a jitter "
-                "buffer."
+                "The delay is not constant, and one step contains only few of its values. So "
+                "the interval of a single fit is not an interval of the mean delay. For the "
+                "mean delay use the intervals of the replayed steps, or make the delay "
+                "constant with a jitter buffer."
             )
         lag = self.runs[0].trial.lag
         if lag > 0.0:
             sentences.append(
-                f"The lag of the plant, {1e3 * lag:.1f} ms, is not part of the measured age. The "
-                "overshoot methods count it as delay; replaying corrects their intervals for it."
+                f"The measured age does not contain the lag of the plant, {1e3 * lag:.1f} ms, "
+                "but the overshoot methods count this lag as delay. The intervals of the "
+                "replayed steps are corrected for it."
             )
         for method, label in IN_WORDS.items():
             found = self.spread(method)
             if found.count == 0:
-                sentences.append(f"{label} gives no estimate in any run.")
+                sentences.append(f"{label} gave no estimate in any run.")
                 continue
             expected = self.expected(method)
             hold = "with the hold" if METHODS[method] else "without the hold"

@@ -47,7 +47,7 @@ class Spread:
         """The interval in words, with how it was found; empty without one."""
         if not math.isfinite(self.low):
             return ""
-        how = "corrected by replaying" if self.replayed else "by the spread of the runs"
+        how = "corrected by replaying" if self.replayed else "from the spread of the runs"
         return f"{how} {between(self.low, self.high, self.error, 's')}"
 
     @staticmethod

@@ -45,4 +45,6 @@ class ExpiringCommand(ABC):
         if self.guarded and age > self.limits.command_age:
             self._motion = self._rest
         if self.guarded and age > self.limits.landing_after:
-            self.give_up(f"no command for {age:.2f} s: the vehicle was commanded to land")
+            self.give_up(
+                f"no command was given for {age:.2f} s, so the vehicle was commanded to land"
+            )

@@ -57,7 +57,7 @@ class Journal:
         self.columns = tuple(columns)
         self.rows = 0
         if not self.columns or len(set(self.columns)) != len(self.columns):
-            raise ValueError(f"columns={list(columns)}: give one or more different names")
+            raise ValueError(f"columns={list(columns)}: give one or more names, all different")
         for name in self.columns:
             if not name or any(sign in name for sign in ',"\r\n'):
                 raise ValueError(
@@ -69,7 +69,7 @@ class Journal:
             file = open(self.path, "xb", buffering=0)  # noqa: SIM115
         except FileExistsError:
             raise FileExistsError(
-                EEXIST, "the file exists already; give another name", str(self.path)
+                EEXIST, "the file exists already: give another name", str(self.path)
             ) from None
         self._writer = _Writer(file, str(self.path))
         # Also closes the file at the end of the program.
@@ -90,19 +90,21 @@ class Journal:
         values = list(row)
         if len(values) != len(self.columns):
             raise ValueError(
-                f"a row of {len(values)} values for the {len(self.columns)} columns "
-                f"{', '.join(self.columns)}"
+                f"a row of {len(values)} values was given for the {len(self.columns)} columns "
+                f"{', '.join(self.columns)}: give one value for each column"
             )
         for name, value in zip(self.columns, values, strict=True):
             if value is not None and not math.isfinite(value):
-                raise ValueError(f"{name}={value} in row {self.rows}: give a finite number or None")
+                raise ValueError(
+                    f"{name}={value} in row {self.rows}: give a finite number, or None"
+                )
         # 12 digits: a microsecond of a day, a micrometre of a megametre.
         self._put("" if value is None else _printed(value) for value in values)
         self.rows += 1
 
     def _put(self, cells: Iterable[str]) -> None:
         if not self._finish.alive:
-            raise ValueError(f"the journal {self.path} is closed: open a new one")
+            raise ValueError(f"the journal {self.path} is closed: open a new journal")
         self._writer.check()
         self._writer.lines.put((",".join(cells) + "\n").encode())
 

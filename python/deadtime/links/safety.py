@@ -41,7 +41,8 @@ class UnitCommand(float):
         number = finite("command", value)
         if not -1.0 <= number <= 1.0:
             raise ValueError(
-                f"command={number} is outside [-1, 1]: use a smaller value, or `saturated`"
+                f"command={number} is outside of -1 to 1: give a value within this range, or "
+                "use `saturated`"
             )
         return super().__new__(cls, number)
 
@@ -63,7 +64,7 @@ class Limits:
     max_climb : float
         Largest commanded vertical speed, m/s.
     max_speed : float
-        Largest horizontal speed commanded, m/s.
+        Largest horizontal speed that is commanded, m/s.
     max_yaw_rate : float
         Largest commanded turn, rad/s.
     max_body_rate : float
@@ -74,7 +75,7 @@ class Limits:
     min_height : float
         Height below which a flight is aborted, m.
     max_height : float
-        Height that ends a flight, m.
+        Height above which a flight is aborted, m.
 
         It is set in the vehicle too, where it has such a setting.
     max_angle : float
@@ -86,7 +87,7 @@ class Limits:
     max_heading_error : float
         The same of a heading, rad.
     max_distance : float
-        Horizontal distance from the take-off that ends a flight, m.
+        Horizontal distance from the take-off beyond which a flight is aborted, m.
 
         Where the vehicle reports its position.
     max_jump : float
@@ -129,17 +130,19 @@ class Limits:
             positive(item.name, getattr(self, item.name))
         if self.min_height >= self.max_height:
             raise ValueError(
-                f"min_height={self.min_height} is not below max_height={self.max_height}"
+                f"min_height={self.min_height} is not below max_height={self.max_height}: "
+                "give a smaller min_height"
             )
         if not self.min_thrust < self.max_thrust <= 1.0:
             raise ValueError(
-                f"min_thrust={self.min_thrust} and max_thrust={self.max_thrust}: give shares, the "
-                "least first"
+                f"min_thrust={self.min_thrust}, max_thrust={self.max_thrust}: give two shares "
+                "from 0 to 1, the smaller one first"
             )
         if self.command_age >= self.landing_after:
             raise ValueError(
-                f"command_age={self.command_age} is not below landing_after={self.landing_after}: "
-                "a vehicle has to hover before it lands"
+                f"command_age={self.command_age} is not below "
+                f"landing_after={self.landing_after}, but a vehicle has to hover before it "
+                "lands: give a longer landing_after"
             )
 
     def largest(self, axis: Axis) -> float:
@@ -162,14 +165,15 @@ class Limits:
         errors = {f"{self.error_of(one):g} {one.unit}": None for one in commanded}
         far = f"{' and '.join(errors)} from the reference"
         if axes != ("z",):
-            far += f", and {self.max_distance:g} m from where it took off"
+            far += f", and {self.max_distance:g} m from its place of take-off"
         return [
             ", ".join(rates),
-            f"stays between {self.min_height:g} and {self.max_height:g} m, no more than {far}",
-            f"aborts beyond {math.degrees(self.max_angle):g} degrees of roll or pitch, below "
-            f"{self.min_battery:g} % of battery, after {self.max_state_age:g} s without a message",
-            f"hovers {self.command_age:g} s after the last command, lands after "
-            f"{self.landing_after:g} s",
+            f"stays between {self.min_height:g} and {self.max_height:g} m, and within {far}",
+            f"aborts if roll or pitch exceeds {math.degrees(self.max_angle):g} degrees, the "
+            f"battery is below {self.min_battery:g} %, or no message arrives for "
+            f"{self.max_state_age:g} s",
+            f"hovers if no command comes for {self.command_age:g} s, and lands after "
+            f"{self.landing_after:g} s without a command",
         ]
 
 
@@ -234,7 +238,7 @@ class Watch:
     >>> state = VehicleState(time=0.0, height=1.0, flying=True, landed=False, sequence=1, battery=9)
     >>> watch.check(state, now=0.0)
     Traceback (most recent call last):
-    deadtime._base.errors.FlightAbortedError: the battery is at 9 %, below 20 %
+    deadtime._base.errors.FlightAbortedError: the battery is at 9 %, below its limit of 20 %
     """
 
     def __init__(
@@ -298,39 +302,48 @@ class Watch:
             return "the vehicle reports an emergency"
         age = now - state.time + self._lateness(state)
         if not age <= limits.max_state_age:
-            return f"the newest message is {age:.2f} s old, more than {limits.max_state_age:g} s"
+            return (
+                f"the newest message is {age:.2f} s old, but at most {limits.max_state_age:g} s "
+                "are allowed"
+            )
         if state.missing > limits.max_missing:
-            return f"{state.missing} messages in a row were lost, more than {limits.max_missing}"
+            return (
+                f"{state.missing} messages in a row were lost, but at most {limits.max_missing} "
+                "are allowed"
+            )
         for angle in (abs(state.roll), abs(state.pitch)):  # separately: `max` may ignore a NaN
             if not angle <= limits.max_angle:
                 return (
-                    f"the vehicle is tilted by {math.degrees(angle):.0f} degrees, more than "
-                    f"{math.degrees(limits.max_angle):g}"
+                    f"the vehicle is tilted by {math.degrees(angle):.0f} degrees, but at most "
+                    f"{math.degrees(limits.max_angle):g} degrees are allowed"
                 )
         if state.battery is not None and not state.battery >= limits.min_battery:
-            return f"the battery is at {state.battery:g} %, below {limits.min_battery:g} %"
+            return (
+                f"the battery is at {state.battery:g} %, below its limit of "
+                f"{limits.min_battery:g} %"
+            )
         if state.fault is not None:
             return f"the vehicle reports that {state.fault}"
         if not limits.min_height <= state.height <= limits.max_height:
             return (
-                f"the height is {state.height:.2f} m, outside {limits.min_height:g} to "
-                f"{limits.max_height:g} m"
+                f"the height is {state.height:.2f} m, outside of its limits, "
+                f"{limits.min_height:g} to {limits.max_height:g} m"
             )
         most = limits.error_of(axis)
         if reference is not None and not abs(value - reference) <= most:
             return (
-                f"the {axis.words} is {value:.2f} {axis.unit} and the reference {reference:.2f} "
-                f"{axis.unit}, more than {most:g} {axis.unit} apart"
+                f"the {axis.words} is {value:.2f} {axis.unit} and its reference {reference:.2f} "
+                f"{axis.unit}, so they differ by more than {most:g} {axis.unit}"
             )
         if not self._distance(state) <= limits.max_distance:
             return (
-                f"the vehicle is {self._distance(state):.2f} m from where it took off, more than "
-                f"{limits.max_distance:g} m"
+                f"the vehicle is {self._distance(state):.2f} m from its place of take-off, but "
+                f"at most {limits.max_distance:g} m are allowed"
             )
         if now - self._moved > limits.max_still:
             return (
-                f"the {axis.words} has read {value:.3f} {axis.unit} for "
-                f"{now - self._moved:.1f} s, although it is not at the reference"
+                f"the {axis.words} has not changed from {value:.3f} {axis.unit} for "
+                f"{now - self._moved:.1f} s, although the reference differs"
             )
         return self._broken_since(state)
 
@@ -354,7 +367,7 @@ class Watch:
         passed = max(passed, 0.0)  # messages may arrive in one burst
         if jumps(last.height, state.height, passed, self.limits.max_jump):
             return (
-                f"the height jumps from {last.height:.2f} to {state.height:.2f} m within "
-                f"{1e3 * passed:.0f} ms, faster than {self.limits.max_jump:g} m/s"
+                f"the height changes from {last.height:.2f} to {state.height:.2f} m within "
+                f"{1e3 * passed:.0f} ms, faster than the limit of {self.limits.max_jump:g} m/s"
             )
         return None

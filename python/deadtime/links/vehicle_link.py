@@ -194,8 +194,8 @@ class VehicleLink(ABC):
             self._check_link()
             if now() - begin > self.longest_take_off:
                 raise LinkError(
-                    f"{self._name} is not up {self.longest_take_off:g} s after the take-off"
-                    f"{self._said(begin)}"
+                    f"{self._name} has not reached its height {self.longest_take_off:g} s after "
+                    f"the take-off{self._said(begin)}"
                 )
 
     async def state(self) -> VehicleState:
@@ -231,7 +231,7 @@ class VehicleLink(ABC):
     def _check_in_air(self) -> None:
         """Raise if no motion can be commanded."""
         if self._commanded.expired is None and not self._commanded.guarded:
-            raise LinkError(f"{self._name} is not in the air: take off before commanding it")
+            raise LinkError(f"{self._name} is not in the air: take off before giving commands")
         self._check_flight()
 
     def hover(self) -> None:
@@ -263,11 +263,11 @@ class VehicleLink(ABC):
             self._keep_landing(now() - begin)
             if self._silence > self.longest_silence:
                 raise LinkError(
-                    f"nothing received from {self._name} for {self._silence:.1f} s while landing: "
-                    f"{self.lands_unheard}"
+                    f"nothing has been received from {self._name} for {self._silence:.1f} s "
+                    f"during the landing, but {self.lands_unheard}"
                 )
             if now() - begin > self.longest_landing:
-                raise LinkError(f"{self._name} has not landed within {self.longest_landing:g} s")
+                raise LinkError(f"{self._name} has not landed after {self.longest_landing:g} s")
         self._landed()
 
     async def close(self) -> None:

@@ -96,7 +96,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         if port == 0:
             port = next(port for port in FREE_PORTS if (host, port) not in taken)
         elif (host, port) in taken:
-            raise OSError(98, f"the address {host}:{port} is in use")
+            raise OSError(98, f"the address {host}:{port} is in use already: give another port")
         return host, port
 
     async def create_datagram_endpoint(  # type: ignore[override]
@@ -138,7 +138,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         remote = (host or "127.0.0.1", port or 0)
         server = self._servers.get(remote)
         if server is None:
-            raise ConnectionRefusedError(111, f"nothing listens on {remote[0]}:{remote[1]}")
+            raise ConnectionRefusedError(111, f"no endpoint listens on {remote[0]}:{remote[1]}")
         local = self._free((remote[0], 0), self._servers)
         near_protocol, far_protocol = protocol_factory(), server.protocol_factory()
         near = _Stream(self, near_protocol, local, remote)
@@ -170,10 +170,12 @@ class _Datagrams(asyncio.DatagramTransport):
             return
         target = addr or self._remote
         if target is None:
-            raise ValueError("there is no address to send to: give one, or connect the endpoint")
+            raise ValueError(
+                "the datagram has no address: give an address, or connect the endpoint"
+            )
         if len(data) > 65507:
             raise OSError(
-                90, f"a datagram of {len(data)} bytes is too long: at most 65507 bytes are possible"
+                90, f"a datagram of {len(data)} bytes is too long: give at most 65507 bytes"
             )
         receiver = self._loop._datagrams.get((target[0], target[1]))
         if receiver is not None:

@@ -20,7 +20,7 @@ DENSER = 2
 ARMED = Condition(state("armed", "state", lambda values: values > 0), "the vehicle is disarmed")
 IN_THE_AIR = Condition(
     in_the_air("landed", "state", lambda values: values == 0),
-    "the vehicle is on the ground or touches down",
+    "the vehicle is on the ground or lands",
 )
 CONTROLLED = closed_where(not_in_modes(UNCONTROLLED))
 HELD_HEIGHT = closed_where(in_modes(VERTICAL))
@@ -29,7 +29,7 @@ HELD_PLACE = closed_where(in_modes(HORIZONTAL))
 #: Firmware of 2014 logs 0 for a height that it does not hold, as in the descent of RTL.
 SET_HEIGHT = Condition(
     state("CTUN", "DAlt", lambda values: values != 0.0),
-    "the log says 0 for a height that is not set",
+    "in this log, a height that is not set is 0",
 )
 
 #: Letter of an axis in the messages RATE, name of its columns in ATT.

@@ -104,12 +104,12 @@ def injected(conditions: tuple[Condition, ...]) -> list[LoopNames]:
     for axis, column, gyro, angles, rate in INJECTED:
         loops += [
             LoopNames(
-                f"{axis} rate from the injected signal", axis, "rate",
+                f"response of the {axis} rate to the injected signal", axis, "rate",
                 (Signal("SIDD", ("Targ",), "deg/s"),), (Signal("SIDD", (gyro,), "deg/s"),),
                 conditions=(*running, _on((rate,))),
             ),
             LoopNames(
-                f"{axis} from the injected signal", axis, "attitude",
+                f"response of {axis} to the injected signal", axis, "attitude",
                 (Signal("SIDD", ("Targ",), "deg"),), (Signal("ATT", (column,), "deg"),),
                 conditions=(*running, _on(angles)),
             ),
@@ -120,4 +120,4 @@ def injected(conditions: tuple[Condition, ...]) -> list[LoopNames]:
 def _on(numbers: tuple[int, ...]) -> Condition:
     """Where the signal is added to these."""
     told = state("SIDS", "Ax", lambda axes: np.isin(axes, numbers))
-    return Condition(told, "the signal is added elsewhere")
+    return Condition(told, "the test signal is added to another command")

@@ -56,10 +56,10 @@ def _asked(axis: int, contents: LogContents) -> tuple[Signal, ...]:
     logged = Signal("main", (f"setpoint[{axis}]",), "deg/s")
     if has_rates(contents.firmware, contents.parameters):
         derive = curve_of_head(contents.parameters, axis)
-        rule = "to deg/s by the rates of the head"
+        rule = "in deg/s, by the rates in the header"
         return logged, Signal("main", (stick,), "deg/s", derive=derive, rule=rule)
     columns = (stick, f"gyroADC[{axis}]", f"axisP[{axis}]")
-    rule = "to deg/s by the controller's term P"
+    rule = "in deg/s, by the controller's P term"
     derived = Signal("main", columns, "deg/s", derive=setpoint_of_controller, rule=rule)
     return logged, derived
 
@@ -130,7 +130,12 @@ def _conditions(contents: LogContents) -> tuple[Condition, ...]:
         return armed
     angles = _has_bit(*bits)
     sticks = state("slow", "flightModeFlags", lambda flags: ~angles(flags))
-    return (*armed, Condition(sticks, "the sticks set angles, whose rates are not logged"))
+    return (
+        *armed,
+        Condition(
+            sticks, "the sticks set angles, and the rates that follow from them are not logged"
+        ),
+    )
 
 
 def names(contents: LogContents) -> AutopilotNames:

@@ -79,7 +79,8 @@ def read_blackbox(data: bytes, source: str, *, flight: int | None = None) -> Log
         )
     if flight is not None and not 1 <= flight <= len(starts):
         raise RecordingError(
-            f"{source}: flight {flight} of {len(starts)}: give a number from 1 to {len(starts)}"
+            f"{source} contains {len(starts)} flights, but flight={flight} is given: give a "
+            f"number from 1 to {len(starts)}"
         )
     best, lengths, faults = None, [], []
     for number, (start, end) in enumerate(zip(starts, [*starts[1:], len(data)], strict=True), 1):
@@ -101,7 +102,7 @@ def read_blackbox(data: bytes, source: str, *, flight: int | None = None) -> Log
     remarks = []
     if len(starts) > 1:
         remarks.append(
-            f"The file holds {len(starts)} flights, of which this is flight {best.number}: "
+            f"The file contains {len(starts)} flights, and this is flight {best.number}: "
             + ", ".join(lengths)
             + "."
         )
@@ -127,7 +128,7 @@ def _read_flight(log: bytes, number: int) -> _Flight:
     head = read_head(log)
     version = head.text("Data version")
     if version != "2":
-        raise RecordingError(f'data version "{version}" is not read, only version 2')
+        raise RecordingError(f'version "{version}" of the data cannot be read, only version 2')
     frames = read_frames(log, head)
     if not frames.main.size:
         raise RecordingError("there is no frame that can be read")
@@ -190,16 +191,16 @@ def _remarks(flight: _Flight, autopilot: str) -> Iterator[str]:
     if not autopilot:
         yield (
             f'The firmware "{flight.head.text("Firmware revision")}" is neither Betaflight, '
-            "Cleanflight nor INAV: its fields are read as the head defines them."
+            "Cleanflight nor INAV, so its fields are read as the header defines them."
         )
     if frames.damaged:
-        yield f"The log is damaged at {frames.damaged} places; these parts are left out."
+        yield f"The log is damaged at {frames.damaged} places, and these parts are left out."
     if frames.unusable:
         yield (
-            f"{frames.unusable} frames are left out because the frame on which they depend is lost."
+            f"{frames.unusable} frames are left out because they depend on a frame that is lost."
         )
     if not frames.ended:
-        yield "The log has no end mark, so it was cut off."
+        yield "The log has no end mark, so it was probably cut off."
 
 
 def _gps(flight: _Flight) -> Topic:

@@ -59,16 +59,18 @@ def layout(head: Head) -> Layout:
     names = head.list("Field I name")
     for name in ("loopIteration", "time"):
         if name not in names:
-            raise RecordingError(f'the head defines no field "{name}"')
+            raise RecordingError(f'the header does not define the field "{name}"')
     intra, inter = _codes(head, "I"), _codes(head, "P")
     if intra is None or len(intra[0]) != len(names):
-        raise RecordingError(f"the head names {len(names)} fields, but encodes another number")
+        raise RecordingError(
+            f"the header names {len(names)} fields, but defines another number of encodings"
+        )
     for letter in "SGH":
         codes, others = _codes(head, letter), head.list(f"Field {letter} name")
         if codes is not None and len(codes[0]) != len(others):
             raise RecordingError(
-                f"the head names {len(others)} fields of {letter} frames, but encodes "
-                f"{len(codes[0])}"
+                f"the header names {len(others)} fields of {letter} frames, but defines "
+                f"{len(codes[0])} encodings"
             )
     motor = "motor[0]"
     return Layout(

@@ -45,7 +45,7 @@ class Head:
         """The numbers of a line that defines fields, each below 256."""
         parts = self.list(name)
         if not all(part.isdecimal() and len(part) < 4 and int(part) < 256 for part in parts):
-            raise RecordingError(f'the line "{name}" of the head is damaged: {self.text(name)!r}')
+            raise RecordingError(f'the line "{name}" of the header is damaged: {self.text(name)!r}')
         return bytes(map(int, parts))
 
     @cached_property

@@ -85,4 +85,4 @@ def not_in_modes(modes: Collection[str]) -> Told:
 
 def closed_where(told: Told) -> Condition:
     """The condition that the flight mode closes a loop."""
-    return Condition(told, "the flight mode does not close this loop")
+    return Condition(told, "in this flight mode the loop is open")

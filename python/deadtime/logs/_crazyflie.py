@@ -75,7 +75,7 @@ def read_crazyflie(data: bytes, source: str) -> LogContents:
     """
     if data[:1] != bytes([MARK]):
         raise RecordingError(
-            f"{source}: not a log of a Crazyflie, which would start with the byte 0xbc"
+            f"{source} is not a log of a Crazyflie, because its first byte is not 0xbc"
         )
     try:
         version, events, start = _definitions(data)
@@ -101,9 +101,9 @@ def read_crazyflie(data: bytes, source: str) -> LogContents:
         }
         topics[_unused(event.name, topics)] = Topic(time, Columns(makers))
     if not topics:
-        raise RecordingError(f"{source}: there is no record that can be read")
+        raise RecordingError(f"{source} contains no record that can be read")
     if not whole:
-        faults.insert(0, "The checksum does not match: the log was cut off, or is damaged.")
+        faults.insert(0, "The checksum is wrong, so the log was cut off or is damaged.")
     return LogContents(
         format="Crazyflie uSD",
         autopilot="Crazyflie",
@@ -118,7 +118,7 @@ def _definitions(data: bytes) -> tuple[int, dict[int, _Event], int]:
     """Version, events by their identifiers, and the offset of the first record."""
     version, count = struct.unpack_from("<HH", data, 1)
     if version not in CLOCKS:
-        raise ValueError(f"version {version} is not known, only 1 and 2")
+        raise ValueError(f"version {version} of the log cannot be read, only versions 1 and 2")
     at, defined = 5, 0
     events: dict[int, _Event] = {}
     for _ in range(count):
@@ -128,12 +128,14 @@ def _definitions(data: bytes) -> tuple[int, dict[int, _Event], int]:
         at += 2
         defined += 1 + variables
         if defined > MOST:
-            raise ValueError(f"more than {MOST} events and variables are defined")
+            raise ValueError(f"the log defines more than {MOST} events and variables")
         found, size = [], 0
         for _ in range(variables):
             text, at = _text(data, at)
             if len(text) < 3 or text[-3] != "(" or text[-1] != ")" or text[-2] not in TYPES:
-                raise ValueError(f'the variable "{text}" has no known type at its end, as "(f)"')
+                raise ValueError(
+                    f'the variable "{text}" does not end in a known type, such as "(f)"'
+                )
             kind = np.dtype("<" + text[-2])
             found.append((text[:-3], kind, size))
             size += kind.itemsize
@@ -147,7 +149,7 @@ def _text(data: bytes, at: int) -> tuple[str, int]:
     """A text up to a byte of zero, and where what follows begins."""
     end = data.find(b"\0", at, at + 256)
     if end < 0:
-        raise ValueError(f"a name at byte {at} has no end")
+        raise ValueError(f"the name that begins at byte {at} has no end")
     return data[at:end].decode("utf-8", "replace"), end + 1
 
 
@@ -165,7 +167,7 @@ def _records(
         if size is None:
             found = _next(data, at, stop, sizes)
             if found is None:
-                faults.append(f"The part from byte {at} of {stop} on is damaged and left out.")
+                faults.append(f"The part from byte {at} of {stop} on is damaged, and is left out.")
                 break
             lost += 1
             at = found
@@ -175,7 +177,7 @@ def _records(
         appends[number](at)
         at += size
     if lost:
-        faults.append(f"The log is damaged at {lost} places; these parts are left out.")
+        faults.append(f"The log is damaged at {lost} places, and these parts are left out.")
     return places, faults
 
 

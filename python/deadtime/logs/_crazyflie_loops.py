@@ -38,7 +38,7 @@ MIXED = {
 }
 
 #: The yaw command turns the vehicle to the other side, and tilts move it against their sign.
-AGAINST = "its sign turned"
+AGAINST = "with the opposite sign"
 
 
 def _motors(command: str, sign: float = 1.0) -> Signal:
@@ -63,7 +63,7 @@ def _rate(axis: str, gyro: str, estimate: str) -> LoopNames:
 
     So does the pitch rate of its estimator. Its yaw command counts against the yaw rate.
     """
-    sign, rule = (-1.0, "the pitch of the controller") if axis == "pitch" else (1.0, "")
+    sign, rule = (-1.0, "pitch as the controller uses it") if axis == "pitch" else (1.0, "")
     turned, why = (-1.0, AGAINST) if axis == "yaw" else (1.0, "")
     return LoopNames(
         name=f"{axis} rate",

@@ -43,10 +43,10 @@ def read_dataflash(data: bytes, source: str) -> LogContents:
     remarks = []
     if index.skipped:
         remarks.append(
-            f"{index.skipped} bytes of the file do not belong to a message and are left out"
+            f"{index.skipped} bytes of the file do not belong to a message, and are left out"
         )
     if index.cut:
-        remarks.append("the file is cut off in a message")
+        remarks.append("the file ends within a message, so it was cut off")
     return contents_of("DataFlash", source, messages, remarks)
 
 

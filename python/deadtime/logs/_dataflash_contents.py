@@ -34,7 +34,7 @@ def contents_of(form: str, source: str, messages: Messages, remarks: list[str]) 
     """
     if set(messages) <= {"FMT"}:
         raise RecordingError(
-            f"{source} begins as a DataFlash log, but has no message of a known format"
+            f"{source} begins like a DataFlash log, but contains no message of a known format"
         )
     if messages.of_px4:
         return _contents_of_px4(messages, remarks)

@@ -25,7 +25,7 @@ def read_dataflash_text(data: bytes, source: str) -> LogContents:
     messages = _TextMessages(lines)
     remarks = []
     if messages.unread:
-        remarks.append(f"{messages.unread} lines of the file are not messages and are left out")
+        remarks.append(f"{messages.unread} lines of the file are not messages, and are left out")
     return contents_of("DataFlash text", source, messages, remarks)
 
 

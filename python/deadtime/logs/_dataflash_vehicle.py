@@ -45,7 +45,11 @@ def vehicle_of(messages: Messages, parameters: Mapping[str, float]) -> tuple[str
         return named["vehicle"], named[0], ""
     shown = [vehicle for vehicle, own in PARAMETERS.items() if own & parameters.keys()]
     if len(shown) == 1:
-        return shown[0], "", f"the log does not name its vehicle: its parameters are a {shown[0]}'s"
+        return (
+            shown[0],
+            "",
+            (f"the log does not name its vehicle, but its parameters are those of a {shown[0]}"),
+        )
     logged = {
         vehicle
         for vehicle, name, column in COLUMNS
@@ -53,5 +57,9 @@ def vehicle_of(messages: Messages, parameters: Mapping[str, float]) -> tuple[str
     }
     if len(logged) == 1 and not shown:
         (vehicle,) = logged
-        return vehicle, "", f"the log does not name its vehicle: its messages are a {vehicle}'s"
+        return (
+            vehicle,
+            "",
+            (f"the log does not name its vehicle, but its messages are those of a {vehicle}"),
+        )
     return "", "", ""

@@ -74,18 +74,21 @@ class Link:
 
     def summary(self) -> str:
         """The link in a sentence."""
-        above = "above the least" if self.half_round_trip is None else "in all"
+        above = "above the shortest time" if self.half_round_trip is None else "in total"
         least = self.half_round_trip or 0.0
         median, late = (stated(least + one, 0.0, "s") for one in (self.median, self.quantile_95))
-        lines = f"link to the ground: {self.message} takes {median} {above}, 95 % {late}"
+        lines = (
+            f"link to the ground: {self.message} takes {median} {above} (median), 95 % of the "
+            f"messages take at most {late}"
+        )
         if self.half_round_trip is None:
-            lines += "; without TIMESYNC the least is not known"
+            lines += ". Without TIMESYNC the shortest time is not known"
         else:
             half = stated(self.half_round_trip, 0.0, "s")
-            lines += f", of which {half} is half the least round trip"
+            lines += f", of which {half} is half of the shortest round trip"
         return (
-            f"{lines}; {100.0 * self.loss:.2g} % of {self.received + self.lost} packets are lost; "
-            f"the clocks drift by {1e6 * self.drift:.0f} ppm, which is taken out"
+            f"{lines}. {100.0 * self.loss:.2g} % of {self.received + self.lost} packets are "
+            f"lost. The clocks drift by {1e6 * self.drift:.0f} ppm, and this drift is removed"
         )
 
     def to_dict(self) -> dict[str, Any]:

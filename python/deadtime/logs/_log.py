@@ -103,15 +103,15 @@ class LogLoop(ReadOnlyArrays):
             or when fewer than 8 rows lie in the part.
         """
         if command not in ("setpoint", "actuator"):
-            raise ValueError(f"command={command!r} is not one of 'setpoint', 'actuator'")
+            raise ValueError(f"command={command!r}: give 'setpoint' or 'actuator'")
         if command not in self.signals:
             raise RecordingError(
-                f"the log does not contain the command of the controller of {self.name}"
+                f"the log does not contain the command that the controller of {self.name} gives"
             )
         if start is None and stop is None:
             if not self.segments:
                 why = "; ".join(self.why_left_out)
-                raise RecordingError(f"{self.name} is never followed: {why}")
+                raise RecordingError(f"{self.name} never follows its setpoint: {why}")
             start, stop = max(self.segments, key=lambda ends: ends[1] - ends[0])
         told = self.signals[command]
         return recording_of(self.name, self.setpoint, self.response, told, (start, stop))
@@ -238,7 +238,7 @@ class Log(ReadOnlyArrays):
         """
         if name not in self.loops:
             has = ", ".join(self.loops) or "none"
-            raise ValueError(f"{self.source} has no loop {name!r}: its loops are {has}")
+            raise ValueError(f"{self.source} has no loop {name!r}. Its loops are {has}")
         return self.loops[name]
 
     def summary(self) -> str:
@@ -254,7 +254,7 @@ class Log(ReadOnlyArrays):
             lines.append(f"modes: {spans}")
         lines.extend(loop.headline() for loop in self.loops.values())
         if not self.loops:
-            lines.append("no loop has both its setpoint and its response in the log")
+            lines.append("for no loop the log contains both the setpoint and the response")
         if self.key_parameters:
             shown = ", ".join(f"{name} = {value:g}" for name, value in self.key_parameters.items())
             lines.append(f"parameters: {shown}")
@@ -319,7 +319,7 @@ def _span(contents: LogContents, source: str) -> tuple[float, float]:
         if time.size:
             ends.append((time.size, float(time[0]), float(time[-1])))
     if not ends:
-        raise RecordingError(f"{source} is a {contents.format} log without a message")
+        raise RecordingError(f"{source} is a {contents.format} log that contains no message")
     _, first, last = max(ends)
     near = [(low, high) for _, low, high in ends if low > first - DAY and high < last + DAY]
     return min(low for low, _ in near), max(high for _, high in near)
@@ -337,7 +337,9 @@ def _loop(
     for series, count in ((setpoint, lost), (response, lost_too)):
         if count:
             topic = series.source.partition(".")[0]
-            remarks.append(f"{topic}: {count} rows whose time repeats or goes back are left out")
+            remarks.append(
+                f"{topic}: {count} rows are left out because their time repeats or goes back"
+            )
     segments, reasons = segments_of(contents, setpoint, response, names.conditions, start)
     return LogLoop(
         names.name, names.axis, names.kind, setpoint, response, actuator, segments, reasons

@@ -28,7 +28,7 @@ FLYING = (
     ),
     Condition(
         in_the_air("EXTENDED_SYS_STATE", "landed_state", lambda values: values != ON_GROUND),
-        "the vehicle is on the ground or touches down",
+        "the vehicle is on the ground or lands",
     ),
 )
 ATTITUDE = (*FLYING, closed_where(not_in_modes(UNCONTROLLED)))
@@ -72,7 +72,7 @@ def _inner_loops() -> list[LoopNames]:
         if axis != "yaw":
             setpoint.append(Signal("NAV_CONTROLLER_OUTPUT", (f"nav_{axis}",), "deg"))
         whole = unwrapped if axis == "yaw" else None
-        rule = "without jumps of a turn" if axis == "yaw" else ""
+        rule = "without jumps of a full turn" if axis == "yaw" else ""
         response = Signal("ATTITUDE", (axis,), "rad", derive=whole, rule=rule)
         angles.append(LoopNames(axis, axis, "attitude", setpoint, (response,), (asked,), ATTITUDE))
     return [*rates, *angles]

@@ -73,8 +73,8 @@ def open_log(path: str | os.PathLike[str], *, flight: int | None = None) -> Log:
         form = _format(path, head)
         if flight is not None and form != "Blackbox":
             raise ValueError(
-                f"flight={flight}: {path} is a {form} log, which contains one flight only: "
-                "leave flight out"
+                f"flight={flight}: {path} is a {form} log, which contains only one flight. "
+                "Leave flight out"
             )
         data = whole(stream, head)
     try:
@@ -83,11 +83,12 @@ def open_log(path: str | os.PathLike[str], *, flight: int | None = None) -> Log:
     except DeadtimeError:
         raise
     except MemoryError:
-        raise RecordingError(f"{path} does not fit into memory") from None
+        raise RecordingError(f"{path} is too large for the memory of this computer") from None
     except Exception as error:
         # Libraries raise what the damage leads to: an index, a key, a missing byte.
         raise RecordingError(
-            f"{path} is a damaged {form} log: reading it ended with {type(error).__name__}: {error}"
+            f"{path} is a damaged {form} log, and reading it ended with "
+            f"{type(error).__name__}: {error}"
         ) from error
 
 
@@ -105,7 +106,7 @@ def _format(path: Path, head: bytes) -> str:
     form = format_of(path, head, "open_log")
     if form is None:
         raise RecordingError(
-            f"{path} is not a log of a known format: it begins with {head[:8].hex(' ')}. "
-            f"These formats are read: {', '.join(READERS)}"
+            f"{path} is not a log of a known format, because it begins with "
+            f"{head[:8].hex(' ')}. These formats can be read: {', '.join(READERS)}"
         )
     return form

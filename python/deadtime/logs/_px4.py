@@ -48,11 +48,11 @@ FLYING = (
     ),
     Condition(
         in_the_air("vehicle_land_detected", "landed", lambda values: values == 0),
-        "the vehicle is on the ground or touches down",
+        "the vehicle is on the ground or lands",
     ),
     Condition(
         state("takeoff_status", "takeoff_state", lambda values: values != RAMP_UP),
-        "the thrust is raised for take-off",
+        "the thrust is rising for the take-off",
     ),
 )
 
@@ -88,7 +88,7 @@ def _rate(axis: str, k: int) -> LoopNames:
 def _attitude(axis: str) -> LoopNames:
     flagged = state("vehicle_control_mode", "flag_control_attitude_enabled", _is_set)
     derive, rule = ANGLES[axis], f"{axis} of the quaternion"
-    turns: dict[str, Any] = {"derive": unwrapped, "rule": "without jumps of a turn"}
+    turns: dict[str, Any] = {"derive": unwrapped, "rule": "without jumps of a full turn"}
     return LoopNames(
         name=axis,
         axis=axis,

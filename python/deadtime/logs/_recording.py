@@ -33,7 +33,7 @@ def recording_of(
     rows = (time >= low) & (time <= high) & np.isfinite(output)
     if not rows.any():
         raise RecordingError(
-            f"{name} has no rows from {low:g} to {high:g} s that follow {told.source}"
+            f"from {low:g} to {high:g} s, {name} has no rows in which it follows {told.source}"
         )
     time, output = time[rows], output[rows]
     fresh = np.ones(time.size, dtype=bool)

@@ -39,7 +39,7 @@ def heading(topic: str, column: str) -> Signal:
     return Signal(
         topic, (column,), "rad",
         derive=lambda degrees: unwrapped(degrees * (np.pi / 180.0)),
-        rule="[deg] to rad without jumps of a turn",
+        rule="[deg] to rad without jumps of a full turn",
     )  # fmt: skip
 
 

@@ -34,7 +34,7 @@ FLYING = (
     Condition(state("STAT", "ArmState", lambda values: values == ARMED), "the vehicle is disarmed"),
     Condition(
         in_the_air("STAT", "Landed", lambda values: values == 0),
-        "the vehicle is on the ground or touches down",
+        "the vehicle is on the ground or lands",
     ),
 )
 
@@ -43,7 +43,7 @@ def _inner(axis: str) -> list[LoopNames]:
     name = axis.capitalize()
     asked = Signal("ARSP", (f"{name}RateSP",), "rad/s")
     turned = unwrapped if axis == "yaw" else None
-    rule = "without jumps of a turn" if axis == "yaw" else ""
+    rule = "without jumps of a full turn" if axis == "yaw" else ""
     tilt, tilted = (
         Signal(topic, (column,), "rad", derive=turned, rule=rule)
         for topic, column in (("ATSP", f"{name}SP"), ("ATT", name))

@@ -40,14 +40,14 @@ def segments_of(
             kept = _cut(kept, moved, condition.otherwise, reasons)
     for name, series in (("setpoint", setpoint), ("response", response)):
         finite = held_rows(series.time, np.isfinite(series.values))
-        kept = _cut(kept, finite, f"the {name} holds no number (NaN)", reasons)
+        kept = _cut(kept, finite, f"the {name} is not a number (NaN)", reasons)
         kept = _cut(kept, outside(list(series.gaps)), f"the {name} has a gap", reasons)
     lost = [(low - start, high - start) for low, high in contents.gaps]
     kept = _cut(kept, outside(lost), "the logger lost data", reasons)
     copies = outside(_copies(setpoint, response))
-    kept = _cut(kept, copies, "the setpoint is a copy of the estimate", reasons)
+    kept = _cut(kept, copies, "the setpoint is only a copy of the estimate", reasons)
     long = [one for one in kept if all(_rows(s, one) >= FEWEST for s in (setpoint, response))]
-    kept = _cut(kept, long, f"a window holds fewer than {FEWEST} rows", reasons)
+    kept = _cut(kept, long, f"a window contains fewer than {FEWEST} rows", reasons)
     return tuple(kept), tuple(reasons)
 
 

@@ -84,10 +84,10 @@ def read_tlog(data: bytes, source: str) -> LogContents:
     remarks = []
     if packets.skipped:
         remarks.append(
-            f"{packets.skipped} bytes of the file do not belong to a packet and are left out"
+            f"{packets.skipped} bytes of the file do not belong to a packet, and are left out"
         )
     if packets.cut:
-        remarks.append("the file is cut off in a packet")
+        remarks.append("the file ends within a packet, so it was cut off")
     if damaged:
         remarks.append(f"{damaged} packets with a wrong checksum are left out")
     found, clock = _one_session(found, vehicle, remarks, source)
@@ -138,14 +138,14 @@ def _one_session(
     if not at.size:
         at, received, sent = _clock_rows(found, vehicle, MEASURED)
     if not at.size:
-        raise RecordingError(f"{source}: no message of the autopilot holds a time of its clock")
+        raise RecordingError(f"{source}: no message of the autopilot contains a time of its clock")
     starts = np.flatnonzero(np.diff(sent) < -RESTART) + 1
     edges = np.concatenate(([0], starts, [at.size]))
     longest = int(np.argmax(np.diff(edges)))
     low, high = edges[longest], edges[longest + 1]
     if starts.size:
         remarks.append(
-            f"the vehicle's clock restarts {starts.size} times: only the longest part is read"
+            f"the vehicle's clock restarts {starts.size} times, so only the longest part is read"
         )
         first = at[low] if low else 0
         last = at[high] if high < at.size else np.inf

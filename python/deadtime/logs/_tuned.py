@@ -94,8 +94,10 @@ def tune_loop(
         if found.verdict != "none":
             return found
         refused.append(f"{one.name}: {'; '.join(found.reasons)}")
-    why = "; ".join(refused) or f"it has none of {', '.join(LOOPS_OF_FORMS[firmware])}"
-    raise NotIdentifiableError(f"no loop of {log.source} can be tuned: {why}")
+    why = "; ".join(refused) or (
+        f"the log has none of the loops {', '.join(LOOPS_OF_FORMS[firmware])}"
+    )
+    raise NotIdentifiableError(f"gains cannot be proposed for any loop of {log.source}: {why}")
 
 
 def _tuned(
@@ -109,19 +111,21 @@ def _tuned(
 ) -> Proposal:
     if loop.name not in LOOPS_OF_FORMS[firmware]:
         names = ", ".join(LOOPS_OF_FORMS[firmware])
-        raise ValueError(f"{loop.name}: {firmware} has gains for {names}")
+        raise ValueError(
+            f"{loop.name}: gains can be proposed for {firmware} only in the loops {names}"
+        )
     record = loop.recording(command="actuator")
     if loop.actuator is not None and loop.actuator.unit != UNITS[loop.kind]:
         unit = loop.actuator.unit or "no unit"
         raise ValueError(
-            f"{loop.name}: the log holds {loop.actuator.source} in {unit}, and the gains command "
-            f"{UNITS[loop.kind] or 'a torque'}"
+            f"{loop.name}: the log contains the command {loop.actuator.source} in {unit}, but "
+            f"the gains of this loop give {UNITS[loop.kind] or 'a torque'}"
         )
     flown = _flown(log, loop.name, firmware)
     if flown is None and controller is None:
         raise ValueError(
-            f"{loop.name}: the log has no gain of this loop, so its controller is not known. "
-            "Give the controller by controller=, on the command line --controller"
+            f"{loop.name}: the log contains no gain of this loop, so its controller is not "
+            "known. Give the controller by controller=, or by --controller on the command line"
         )
     own = form is None or form == firmware
     return tune(

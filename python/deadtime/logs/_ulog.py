@@ -138,8 +138,8 @@ def _modes(topics: dict[str, Topic]) -> tuple[tuple[float, str], ...]:
 def _remarks(log: Any) -> tuple[str, ...]:
     remarks = []
     if log.file_corruption:
-        remarks.append("the file is damaged: what could not be read is left out")
+        remarks.append("the file is damaged, so parts that cannot be read are left out")
     if log.dropouts:
         lost = 1e-3 * sum(one.duration for one in log.dropouts)
-        remarks.append(f"the logger lost data {len(log.dropouts)} times, {lost:.3g} s in all")
+        remarks.append(f"the logger lost data {len(log.dropouts)} times, for {lost:.3g} s in total")
     return tuple(remarks)

@@ -105,8 +105,9 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
         if in_series > 0.0:
             if delay_path == "measurement":
                 raise ValueError(
-                    f"delay_path='measurement': the plant has a delay of {in_series:g} s between "
-                    "command and output; leave delay_path out, or give the plant without its delay"
+                    "delay_path='measurement' is not possible, because the plant has a delay "
+                    f"of {in_series:g} s between command and output: leave delay_path out, or "
+                    "give the plant without its delay"
                 )
             delay = in_series + (0.0 if delay is None else non_negative("delay", delay))
         controls = controller_of(controller)
@@ -192,7 +193,7 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
                     parts[part] = parts[part]._replace(numbers)
         if changes:
             raise ValueError(
-                f"{', '.join(changes)}: no such number in this loop, which has "
+                f"{', '.join(changes)}: this loop has no such parameter. Its parameters are "
                 f"{', '.join(self.parameters)}"
             )
         return ControlLoop(**parts)
@@ -259,11 +260,11 @@ def _with_computation(time: float, delay: float | None, path: str) -> float:
     if delay is None:
         raise ValueError(
             f"computation_time={time:g} is added to the delay, but the delay is None: give "
-            "both, or give their sum as the delay once it is known"
+            "both. Or, once their sum is known, give the sum as the delay"
         )
     if path == "measurement":
         raise ValueError(
-            f"computation_time={time:g} delays the command, but with delay_path='measurement' "
-            "the delay is elsewhere: leave one of the two out"
+            f"computation_time={time:g} delays the command, but delay_path='measurement' delays "
+            "the measurement: leave one of the two out"
         )
     return non_negative("delay", delay) + time

@@ -115,7 +115,9 @@ class Controller:
             is_open = is_open and value == 0.0
         if is_open:
             gains = ", ".join(f"{name}=0" for name in self._gains())
-            raise ValueError(f"{gains}: without gain the loop is open; give a gain other than zero")
+            raise ValueError(
+                f"{gains}: a loop whose gains are all zero is open. Give a gain other than zero"
+            )
         smooth = self._filter
         if smooth is not None and not isinstance(smooth, DerivativeFilter):
             raise TypeError(f"filter={smooth!r}: give a DerivativeFilter or None")

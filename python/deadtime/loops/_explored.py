@@ -41,23 +41,26 @@ def described(loop: LoopSpecification) -> dict[str, Any]:
     controller, plant = loop.controller, _simplest(loop.plant)
     if not plant.is_rational or not plant.is_linear:
         raise ValueError(
-            f"{type(plant).__name__}: the explorer shows only linear plants that are rational "
-            "except for one delay in series. Make a loop around such a plant first"
+            f"the explorer cannot show a {type(plant).__name__}. It shows linear plants that "
+            "are rational except for one delay in series. Make a loop with such a plant"
         )
     refuse_discretised(controller, loop.sample_time, "the explorer")
     known = type(controller).__name__
     shown = {"weight", "tracking_time"} if known in ("PI", "PID") else set()
     if loop.rate_limit is not None or not shown.issuperset(controller._extras):
         raise ValueError(
-            "the explorer shows no rate limit, no feed-forward and no weight of a derivative: "
-            "leave them out"
+            "the explorer cannot show a rate limit, a feed-forward or a weight of the "
+            "derivative: leave them out"
         )
     if known not in ("P", "PI", "PD", "PV", "PID"):
-        raise ValueError(f"{known}: the explorer shows P, PI, PD, PV and PID controllers")
+        raise ValueError(
+            f"the explorer cannot show {known}. It shows P, PI, PD, PV and PID controllers"
+        )
     low, high = loop.bounds
     if is_unequal(loop.limit) and not 0.0 < high < math.inf > -low:
         raise ValueError(
-            f"limit={loop.limit!r}: the explorer shows two finite limits, the greater one positive"
+            f"limit={loop.limit!r}: the explorer needs two finite limits, the greater one "
+            "above zero"
         )
     state: dict[str, Any] = {
         "controller": known,

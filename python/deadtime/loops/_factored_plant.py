@@ -81,15 +81,15 @@ class FactoredPlant(Plant):
         object.__setattr__(self, "zero", finite("zero", self.zero))
         if (self.pole_frequency is None) != (self.pole_damping is None):
             raise ValueError(
-                f"pole_frequency={self.pole_frequency}, pole_damping={self.pole_damping}: a pair "
-                "of complex poles has both; give both or neither"
+                f"pole_frequency={self.pole_frequency}, pole_damping={self.pole_damping}: a "
+                "complex pair of poles needs both numbers, so give both or leave both out"
             )
         for name in PAIR if self.has_pair else ():
             object.__setattr__(self, name, positive(name, getattr(self, name)))
         if not lags and not self.integrator and not self.has_pair:
             raise ValueError(
-                "a plant without lags or integrator is only a gain: give lags, such as "
-                "lags=[0.1], or RationalPlant([gain], [1.0])"
+                "a plant without lags and without integrator is only a gain: give lags, such "
+                "as lags=[0.1], or give RationalPlant([gain], [1.0])"
             )
         if self.zero != 0.0 and not any(lags) and not self.has_pair:
             raise ValueError(

@@ -117,12 +117,14 @@ def simulate_fixed_step(
     """
     duration, length = finite("end", end), positive("step", step)
     if duration < 0.0:
-        raise ValueError(f"end={duration} s lies before the start of the run at 0")
+        raise ValueError(
+            f"end={duration} s is before the start of the run, which is at 0: give a later end"
+        )
     refuse_discretised(loop.controller, loop.sample_time, "a run in fixed steps")
     if loop.rate_limit is not None or getattr(loop.controller, "anti_windup", None) is not None:
         raise ValueError(
-            "a run in fixed steps has no rate_limit and no anti_windup: leave them out, or use "
-            "loop.simulate"
+            "a run in fixed steps cannot have a rate_limit or anti_windup: leave them out, or "
+            "use loop.simulate"
         )
     specification = loop.specification
     delay = specification.known_delay
@@ -130,8 +132,8 @@ def simulate_fixed_step(
     before = initial if reference_before is None else finite("reference_before", reference_before)
     if reference_time is None and np.ndim(reference):
         raise ValueError(
-            f"reference has shape {np.shape(reference)}: give reference_time, the times from which "
-            "its values hold"
+            f"reference has shape {np.shape(reference)}: give reference_time too, with the time "
+            "from which each value is valid"
         )
     jumps = reference_jumps(np.zeros(1), reference, reference_time, before)
     past = jumps.just_before(0.0)
@@ -178,8 +180,8 @@ def _inputs(
             found.append((np.empty(0), np.empty(0)))
         elif callable(put) and not isinstance(put, SampledNoise):
             raise ValueError(
-                f"{name} is a function, and fixed steps would miss the points where it bends. "
-                "Give a number, an array or a pair (times, values)"
+                f"{name} is a function, and fixed steps would miss the points where the "
+                "function bends. Give a number, an array or a pair (times, values)"
             )
         else:
             times = steps[0] * np.arange(steps[1] + 1.0)
@@ -192,7 +194,8 @@ def _steps(duration: float, step: float) -> int:
     count = duration / step
     if count > 2**53:
         raise ValueError(
-            f"step={step} s makes {count:.1e} steps, which is too many: give a longer step"
+            f"with step={step} s the run has {count:.1e} steps, which is too many: give a "
+            "longer step"
         )
     return round(count) if abs(count - round(count)) <= _WHOLE else math.ceil(count)
 
@@ -203,7 +206,7 @@ def _sample_steps(sample_time: float | None, step: float) -> int | None:
     ratio = sample_time / step
     if ratio < 0.5 or abs(ratio - round(ratio)) > _WHOLE * ratio:
         raise ValueError(
-            f"the sample time of {sample_time} s is {ratio:.6g} steps: give a step that "
-            "divides the sample time"
+            f"the sample time of {sample_time} s is {ratio:.6g} steps, which is not a whole "
+            "number: give a step that divides the sample time"
         )
     return round(ratio)

@@ -68,8 +68,8 @@ class LoopGain:
     def _without_hold(self, question: str) -> LoopSpecification:
         """The continuous loop, for a question that would leave a hold out."""
         self.specification.refuse_hold(
-            "has a hold in it, which this transfer function would leave out: use "
-            f"continuous().{question}() to leave it out on purpose"
+            "has a hold, which this transfer function would ignore. To ignore the hold on "
+            f"purpose, use continuous().{question}()"
         )
         return self.specification
 
@@ -147,9 +147,9 @@ class LoopGain:
         if of in ("output", "command"):
             if self.specification.sample_time is not None:
                 raise ValueError(
-                    f"of={of!r}: between samples, the response of a sampled loop to one "
-                    "frequency contains many frequencies. Give 'sensitivity' or "
-                    "'complementary', or use the continuous() loop"
+                    f"of={of!r}: between samples, a sampled loop responds to one frequency with "
+                    "many frequencies. Give 'sensitivity' or 'complementary', or use the "
+                    "continuous() loop"
                 )
             return self.specification.transfer(of).hinf_norm()
         found = self._margin(delay_margin=False)
@@ -257,6 +257,6 @@ class LoopGain:
             return self.margin()._delay_margin()
         if not loop.native.is_stable():
             raise ValueError(
-                "the loop is not stable without further delay, so it has no delay margin"
+                "the loop is not stable even without further delay, so it has no delay margin"
             )
         return loop.native.further_delay()[0]

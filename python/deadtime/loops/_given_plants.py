@@ -54,12 +54,13 @@ class PlantWithDelays(Plant):
         num, den = self.transfer.num, self.transfer.den
         if not self.transfer.is_proper:
             raise ValueError(
-                f"plant={self.transfer!r}: the numerator has degree {num.degree} and the "
-                f"denominator {den.degree}; a plant cannot differentiate its command"
+                f"plant={self.transfer!r}: the numerator has degree {num.degree}, and the "
+                f"denominator only {den.degree}. A plant cannot differentiate its command, so "
+                "give a denominator of at least the degree of the numerator"
             )
         if not self.transfer.is_causal:
             raise ValueError(
-                f"plant={self.transfer!r}: its output would depend on later commands; give a "
+                f"plant={self.transfer!r}: its output would depend on later commands. Give a "
                 "causal plant"
             )
         object.__setattr__(self, "gain", non_zero("gain", self.gain, NO_GAIN))
@@ -94,7 +95,7 @@ def plant_and_delay(given: object) -> tuple[Plant, float]:
     G = transfer_function_of(given)
     if G is None:
         raise TypeError(
-            f"plant={given!r}: give a plant, for example Integrator(), a TransferFunction or "
+            f"plant={given!r}: give a plant such as Integrator(), a TransferFunction, a "
             "DelaySystem, or a system of python-control or scipy.signal"
         )
     if len(G.num.delays) > 1 or len(G.den.delays) > 1:
@@ -102,8 +103,8 @@ def plant_and_delay(given: object) -> tuple[Plant, float]:
     late = float(G.num.delays[0] - G.den.delays[0])
     if late < 0.0:
         raise ValueError(
-            f"plant={G!r}: its output would come {-late:g} s before its command; give a "
-            "causal plant"
+            f"plant={G!r}: its output would come {-late:g} s before its command. Give a causal "
+            "plant"
         )
     num, den = (h.coefficients[0, ::-1].tolist() for h in (G.num, G.den))
     return RationalPlant(num, den), late
@@ -120,8 +121,9 @@ def transfer_function_of(given: object) -> TransferFunction | None:
     if isinstance(given, DelaySystem):
         if (given.n_inputs, given.n_outputs) != (1, 1):
             raise ValueError(
-                f"{given!r} as a plant: give a system with one input and one output, or one "
-                "of its transfer functions, such as system.transfer_function(output, input)"
+                f"{given!r} cannot be the plant: give a system with one input and one output, "
+                "or one of its transfer functions, such as system.transfer_function(output, "
+                "input)"
             )
         return given.transfer_function()
     found = polynomials_of(given)

@@ -31,6 +31,6 @@ def held_plane(
         low = float(np.min(axes.get(name, np.array(values[name]))))
         if low < 0.0 or (name == "sample_time" and low == 0.0):
             raise ValueError(
-                f"{name}={low}: delays must be zero or more, and sample times above zero"
+                f"{name}={low}: give delays of zero or more, and sample times above zero"
             )
     return loop.kernel_at(fixed).plane(dict(axes), loop.polynomials_of)

@@ -275,8 +275,8 @@ class LoopInTime:
             if not found.is_settled:
                 raise ValueError(
                     f"the output does not come to rest within {found.span:.4g} s after the "
-                    "load. Either the loop is not stable, or its limit is too small for this "
-                    "load. Give time="
+                    "load. Either the loop is not stable, or the limit of the command is too "
+                    "small for this load. To see the response until a certain time, give time="
                 )
             times = shown_times(found)
         name = "load" if question.of == "load" else "output_disturbance"
@@ -312,14 +312,14 @@ class LoopInTime:
         """
         loop = self.specification
         loop.refuse_hold(
-            "reads its reference at samples and sees no impulse: use "
+            "reads its reference only at samples, so it does not see an impulse: use "
             "continuous().impulse_response()"
         )
         for name in ("limit", "rate_limit"):
             if getattr(loop, name) is not None:
                 raise ValueError(
-                    f"{name}={getattr(loop, name)!r}: an impulse causes a command beyond any "
-                    f"limit; remove the limit with loop.replace({name}=None)"
+                    f"{name}={getattr(loop, name)!r}: an impulse needs a command beyond any "
+                    f"limit. Remove the limit with loop.replace({name}=None)"
                 )
         found = loop.transfer("output").impulse_response(time)
         return replace(found, inputs=np.full_like(found.inputs, np.nan))
@@ -351,8 +351,8 @@ def _driven_response(loop: LoopSpecification, times: Array, given: RunArguments)
     """The response to inputs besides a held reference."""
     if given.sensitivities:
         raise ValueError(
-            "sensitivities: there are none for a run with loads, noise or a function; leave "
-            "sensitivities out"
+            "sensitivities are not computed for a run with loads, noise or a function as "
+            "input: leave sensitivities out"
         )
     if times.size == 0:
         raise ValueError("time is empty: give at least one output time")
@@ -361,7 +361,7 @@ def _driven_response(loop: LoopSpecification, times: Array, given: RunArguments)
     if callable(reference):
         if given.reference_time is not None:
             raise ValueError(
-                "reference is a function, so reference_time has no use: leave reference_time out"
+                "reference is a function, which needs no reference_time: leave reference_time out"
             )
         if loop.sample_time is None:
             # From its value before the start on.

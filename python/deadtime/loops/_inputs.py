@@ -160,8 +160,8 @@ def _pieces(name: str, given: Any, times: Array) -> _Pieces:
     if isinstance(given, tuple):
         if len(given) != 2:
             raise ValueError(
-                f"{name} is a tuple of {len(given)} entries: give a pair of arrays, times and "
-                "values"
+                f"{name} is a tuple of {len(given)} entries: give a pair of two arrays, times "
+                "and values"
             )
         starts = increasing(f"the times of {name}", given[0])
         values = real_array(name, given[1])
@@ -171,11 +171,12 @@ def _pieces(name: str, given: Any, times: Array) -> _Pieces:
     values = values.reshape(1) if values.ndim == 0 else values
     if values.shape != starts.shape or values.size == 0:
         raise ValueError(
-            f"{name} has shape {values.shape} and its times {starts.shape}: give a number, one "
-            "value for each element of time, a pair (times, values), or a function of the time"
+            f"{name} has shape {values.shape}, and its times have shape {starts.shape}: give a "
+            "number, one value for each entry of time, a pair (times, values), or a function "
+            "of time"
         )
     if not np.isfinite(values).all():
-        raise ValueError(f"{name} holds {values[~np.isfinite(values)][0]}: give finite numbers")
+        raise ValueError(f"{name} contains {values[~np.isfinite(values)][0]}: give finite numbers")
     # Before the start of the run only the last value matters.
     past = int(np.searchsorted(starts, times[0], side="right"))
     if past > 1:
@@ -202,7 +203,8 @@ def _noise(
         drawn = deviation * np.random.default_rng(seed).standard_normal(when.size)
     if drawn.shape != when.shape:
         raise ValueError(
-            f"noise gives values of shape {drawn.shape}, but there are {when.size} times"
+            f"noise returned values of shape {drawn.shape} for {when.size} times: return one "
+            "value for each time"
         )
     return _Pieces(when, drawn[:, None])
 
@@ -226,8 +228,8 @@ def _fitted(name: str, function: Callable[[Any], Any], times: Array) -> _Pieces:
         found = np.broadcast_to(found, when.shape) if found.ndim == 0 else found
         if found.shape != when.shape or not np.isfinite(found).all():
             raise ValueError(
-                f"{name} gives values of shape {found.shape} at {when.size} times, or values that "
-                "are not finite: give a function of an array of times in s"
+                f"{name} returned values of shape {found.shape} for {when.size} times, or "
+                "values that are not finite: give a function that takes an array of times in s"
             )
         return found
 
@@ -268,8 +270,8 @@ def _fitted(name: str, function: Callable[[Any], Any], times: Array) -> _Pieces:
         count += int(np.count_nonzero(done))
         if count + 2 * np.count_nonzero(~done) > _MOST_PIECES:
             raise ValueError(
-                f"{name} changes too often: {_MOST_PIECES} pieces between its jumps are not "
-                "enough. Give a shorter run, or values at times, as a pair (times, values)"
+                f"{name} changes too often: {_MOST_PIECES} pieces cannot follow it between its "
+                "jumps. Give a shorter run, or a pair (times, values)"
             )
         lengths = half[done, None]
         # Where a jump lies within, what follows sets the value after it.

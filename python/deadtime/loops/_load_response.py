@@ -108,10 +108,11 @@ class LoadResponse(Response):
         """
         if unused:
             raise TypeError(
-                f"{', '.join(unused)}: its figures are those against the output before it"
+                f"{', '.join(unused)}: a load response takes no arguments here, because its "
+                "figures are relative to the output before the load"
             )
         if output != 0:
-            raise IndexError(f"output={output}: a loop has only one output, number 0")
+            raise IndexError(f"output={output}: a loop has only one output. Give 0")
         names = ("peak", "peak_time", "iae", "ie", "recovery_time")
         return {name: getattr(self, name) for name in names}
 
@@ -126,16 +127,18 @@ def asked(
     """Check the arguments of `ControlLoop.load_response`; None where no times are given."""
     if not loop.plant.is_rational:
         raise ValueError(
-            "the load response of a plant with delays inside is not computed: give a plant "
+            "the load response of a plant with delays inside cannot be computed: give a plant "
             "that is rational except for one delay in series"
         )
     _ = loop.known_delay
     height = finite("size", size)
     if height == 0.0:
-        raise ValueError("size=0: this is not a load; give a number other than zero")
+        raise ValueError("size=0 is not a load: give a number other than zero")
     band = positive("settling", settling)
     if band >= 1.0:
-        raise ValueError(f"settling={settling}: give a fraction of the largest deviation, below 1")
+        raise ValueError(
+            f"settling={settling}: give a share of the largest deviation, between 0 and 1"
+        )
     question = DeviationQuestion(load_of(at), height, band)
     if time is None:
         return question, None
@@ -146,7 +149,7 @@ def asked(
         times = np.array(increasing("time", given))
         if times.size < 2:
             raise ValueError(
-                "time has only one entry: give the first and the last time, or a number"
+                "time has only one entry: give several times, or only the last time as a number"
             )
     return question._replace(span=float(times[-1] - times[0])), times
 

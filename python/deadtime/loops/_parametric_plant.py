@@ -73,7 +73,9 @@ class ParametricPlant(Plant):
             raise ValueError(f"numbers={numbers!r}: give a name and a value for each number")
         taken = [name for name in TAKEN if name in numbers]
         if taken:
-            raise ValueError(f"the name {taken[0]!r} is already used by the loop: take another")
+            raise ValueError(
+                f"the name {taken[0]!r} is already a parameter of the loop: give another name"
+            )
         values = {str(name): finite(str(name), value) for name, value in numbers.items()}
         object.__setattr__(self, "polynomials_of", polynomials)
         object.__setattr__(self, "numbers", FrozenDict(values))
@@ -111,12 +113,13 @@ class ParametricPlant(Plant):
             num, den = self.polynomials_of(**{name: values[name] for name in self.numbers})
         except TypeError as error:
             raise TypeError(
-                f"polynomials({', '.join(self.numbers)}) failed: {error}; it takes the named "
-                "numbers and returns (num, den), and in maps it may only add, subtract and multiply"
+                f"polynomials({', '.join(self.numbers)}) failed: {error}. This function takes "
+                "the named numbers and returns (num, den). For maps it may only add, subtract "
+                "and multiply"
             ) from error
         except ValueError as error:
             raise ValueError(
-                f"polynomials({', '.join(self.numbers)}) failed: {error}; it returns two lists, "
-                "(num, den)"
+                f"polynomials({', '.join(self.numbers)}) failed: {error}. This function must "
+                "return two lists, (num, den)"
             ) from error
         return list(num), list(den)

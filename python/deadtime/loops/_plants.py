@@ -143,8 +143,8 @@ class Plant(ABC):
 
 
 #: Reasons why a number cannot be zero, for errors.
-NO_GAIN = "a plant without gain does not answer its command, so the loop is open"
-NO_TIME = "the plant is then a gain alone, RationalPlant([gain], [1.0])"
+NO_GAIN = "a plant whose gain is zero does not respond to its command, so the loop is open"
+NO_TIME = "then the plant is only a gain, which is RationalPlant([gain], [1.0])"
 
 
 @dataclass(frozen=True)
@@ -265,8 +265,8 @@ class RationalPlant(Plant):
         den = _coefficients("den", self.den)
         if len(num) > len(den):
             raise ValueError(
-                f"num has degree {len(num) - 1} and den {len(den) - 1}: a plant cannot "
-                "differentiate its command, give den at least the degree of num"
+                f"num has degree {len(num) - 1}, and den only {len(den) - 1}. A plant cannot "
+                "differentiate its command, so give a den of at least the degree of num"
             )
         object.__setattr__(self, "num", num)
         object.__setattr__(self, "den", den)

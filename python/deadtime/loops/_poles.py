@@ -54,9 +54,9 @@ class LoopPoles:
         'neutral'
         """
         self.specification.refuse_hold(
-            "has finitely many poles and no characteristic quasi-polynomial: use "
-            "transition_matrix() or rightmost(), or continuous().characteristic() for the loop "
-            "without its hold"
+            "has finitely many poles, and no characteristic quasi-polynomial: use "
+            "transition_matrix() or rightmost(). For the loop without its hold, use "
+            "continuous().characteristic()"
         )
         loop = self.specification
         _ = loop.known_delay
@@ -236,10 +236,10 @@ class LoopPoles:
         if found is None:
             near = self.rightmost()
             raise ValueError(
-                f"a pole at {near[0]:.6g} 1/s, known to {near.radii[0]:.1e}, is closer to the "
-                "imaginary axis than rounding errors. So double precision cannot decide "
-                "whether this loop is stable. Change a gain, or take a sample_time nearer to "
-                "the time constants of the loop"
+                f"a pole at {near[0]:.6g} 1/s is known only to {near.radii[0]:.1e} 1/s, and is "
+                "closer to the imaginary axis than this error. So double precision cannot "
+                "decide whether this loop is stable. Change a gain, or take a sample_time "
+                "closer to the time constants of the loop"
             )
         return found
 
@@ -322,12 +322,12 @@ class LoopPoles:
         values = loop.parameters
         if name not in values or name in MOVES_NO_POLE:
             raise ValueError(
-                f"{name!r} is not a number with a stable range: choose one of "
+                f"{name!r} is not a parameter with a stable range: choose one of "
                 f"{', '.join(known for known in values if known not in MOVES_NO_POLE)}"
             )
         if not self.is_stable():
             raise ValueError(
-                f"the loop is not stable at {name}={values[name]}: start from a stable loop, "
+                f"at {name}={values[name]} the loop is not stable: start from a stable loop, "
                 "for example with lower gains"
             )
         return loop.stable_range(name)
@@ -367,9 +367,9 @@ class LoopPoles:
         """Characteristic function with the numbers `names` as its parameters."""
         loop = self.specification
         loop.refuse_hold(
-            "has no characteristic function for a proof, because its poles are eigenvalues. "
-            "Use loop.continuous() for the loop without its hold, or use dtm.stability_map "
-            "for single cells"
+            "has poles that are eigenvalues, and no characteristic function for a proof. Use "
+            "loop.continuous() for the loop without its hold, or dtm.stability_map for single "
+            "cells"
         )
         return loop.family_of(tuple(names))
 

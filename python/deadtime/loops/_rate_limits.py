@@ -176,6 +176,6 @@ class RateLimited(Plant):
     def _refuse(self) -> NoReturn:
         raise ValueError(
             "the plant limits the rate of its command, so it is not linear. Use "
-            "loop.replace(plant=loop.plant.for_small_commands()), which is valid while no "
+            "loop.replace(plant=loop.plant.for_small_commands()), which is exact as long as no "
             "limit is reached"
         )

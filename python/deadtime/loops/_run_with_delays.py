@@ -31,13 +31,13 @@ def simulate_with_delays(loop: LoopSpecification, given: RunArguments) -> Respon
     for name, is_given in others.items():
         if is_given:
             raise ValueError(
-                f"{name}: a loop whose plant has delays inside does not take {name}. This "
+                f"{name}: a loop whose plant has delays inside cannot use this argument. The "
                 "argument needs a plant that is rational except for one delay in series"
             )
     if callable(given.reference):
         raise ValueError(
-            "reference: a loop whose plant has delays inside takes a number or an array; give "
-            "values, and in reference_time the times at which they begin"
+            "reference is a function, but a loop whose plant has delays inside needs a number "
+            "or an array: give values, and in reference_time the times at which they begin"
         )
     times = one_dimensional("time", given.time)
     if times.size == 0:
@@ -50,8 +50,8 @@ def simulate_with_delays(loop: LoopSpecification, given: RunArguments) -> Respon
     rest = output.dcgain() * past if past != 0.0 else 0.0
     if not abs(rest - initial) <= _AT_REST * max(abs(rest), abs(initial)):
         raise ValueError(
-            f"initial_output={initial:g}: under the reference {past:g} before the start, this "
-            f"loop rests at {rest:g}. With delays inside its plant it can start only from "
+            f"initial_output={initial:g}: before the start the reference is {past:g}, and this "
+            f"loop rests at {rest:g}. A loop with delays inside its plant can start only from "
             "this rest"
         )
     later = jumps.times >= start
@@ -121,8 +121,8 @@ def _driven(loop: LoopSpecification) -> tuple[TransferFunction, TransferFunction
     command = loop.transfer("command")
     if not command.is_proper:
         raise ValueError(
-            "a step of the reference makes the command of this loop an impulse. Give its "
-            "derivative a DerivativeFilter, or take the derivative of the measurement alone, "
+            "a step of the reference would make the command of this loop an impulse. Give the "
+            "controller a DerivativeFilter, or take the derivative of the measurement alone, "
             "as PV does"
         )
     return loop.transfer("output"), command

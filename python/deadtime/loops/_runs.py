@@ -77,14 +77,15 @@ def reference_jumps(
     if values.ndim == 0:
         if reference_time is not None:
             raise ValueError(
-                f"reference={values} is one number, so reference_time has no use: give an "
-                "array with one value for each time"
+                f"reference={values} is one number, which needs no reference_time: give an "
+                "array with one value for each time, or leave reference_time out"
             )
         return ReferenceJumps(times[:1], values.reshape(1), before)
     where = times if reference_time is None else increasing("reference_time", reference_time)
     if values.shape != where.shape or values.size == 0:
         raise ValueError(
-            f"reference has shape {values.shape} and its times {where.shape}: give one value for "
-            "each element of reference_time (or of time, without reference_time), at least one"
+            f"reference has shape {values.shape}, and its times have shape {where.shape}: give "
+            "one value for each entry of reference_time, or of time if reference_time is left "
+            "out"
         )
     return ReferenceJumps(where, values, before)

@@ -29,18 +29,19 @@ def slope_names(loop: LoopSpecification, names: Sequence[str]) -> tuple[str, ...
     for name in names:
         if name not in known:
             raise ValueError(
-                f"sensitivities: this loop has no number {name!r}; choose from {', '.join(known)}"
+                f"sensitivities: this loop has no parameter {name!r}. Choose from "
+                f"{', '.join(known)}"
             )
         if name.startswith("lag") and known[name] == 0.0:
             raise ValueError(
-                f"sensitivities: at {name}=0 the plant changes its order, so there is no "
-                "derivative with respect to the lag. Give the plant a small lag, or take the "
+                f"sensitivities: at {name}=0 the order of the plant changes, so there is no "
+                "derivative with respect to this lag. Give the plant a small lag, or take the "
                 "derivative with respect to the delay, which has a similar effect"
             )
         if name == "delay" and known[name] == 0.0 and loop.sample_time is None:
             raise ValueError(
-                "sensitivities: at delay=0 the derivative of a continuous loop with respect to "
-                "the delay is not computed; give the loop a small delay"
+                "sensitivities: at delay=0 the derivative with respect to the delay cannot be "
+                "computed for a continuous loop. Give the loop a small delay"
             )
     return tuple(dict.fromkeys(names))
 

@@ -81,7 +81,7 @@ class LoopSpecification(PickledByFields):
             if value is not None:
                 raise ValueError(
                     f"{name}={value}: a hold or a limit needs a plant that is rational except "
-                    f"for one delay in series, but this plant has delays inside; leave {name} "
+                    f"for one delay in series, but this plant has delays inside. Leave {name} "
                     "out"
                 )
 
@@ -116,8 +116,8 @@ class LoopSpecification(PickledByFields):
         """The delay in s; raises where it is None."""
         if self.delay is None:
             raise ValueError(
-                "the delay of this loop is None: set it with loop.replace(delay=...) or estimate "
-                "it from a recording first"
+                "the delay of this loop is None: give the delay with loop.replace(delay=...), "
+                "or estimate it from a recording first"
             )
         return self.delay
 
@@ -301,8 +301,8 @@ class UnequalLimits:
 
     def _refuse(self, *_: object) -> NoReturn:
         raise ValueError(
-            f"limit={self!r}: this function needs equal limits of the command, or none; give "
-            "loop.replace(limit=...) one number"
+            f"limit={self!r}: this function needs the same limit for positive and negative "
+            "commands, or none. Use loop.replace(limit=...) with one number"
         )
 
     __float__ = __neg__ = __abs__ = __format__ = _refuse
@@ -323,12 +323,14 @@ def _limit(limit: Any) -> Any:
     if not (isinstance(limit, (tuple, list)) or np.ndim(limit) == 1):
         return positive("limit", limit)
     if len(limit) != 2:
-        raise ValueError(f"limit={limit!r}: give a number, or the least and the greatest command")
+        raise ValueError(
+            f"limit={limit!r}: give one number, or a pair of the least and the greatest command"
+        )
     low, high = (float("nan") if x is None else float(x) for x in limit)
     if not (low < high and low <= 0.0 <= high):
         raise ValueError(
-            f"limit={limit!r}: give the least and the greatest command, with zero between "
-            "them; float('inf') for no limit"
+            f"limit={limit!r}: give the least and the greatest command, with zero between them. "
+            "For no limit, give float('inf')"
         )
     return high if low == -high else UnequalLimits(low, high)
 
@@ -342,11 +344,11 @@ def numbers_of(parameters: Mapping[str, float | None], names: Collection[str]) -
     if unknown:
         raise ValueError(
             f"ranges for {', '.join(unknown)}: the stability of this loop does not depend on "
-            f"such a number, but on {', '.join(dict.fromkeys([*values, 'delay']))}"
+            f"this parameter. It depends on {', '.join(dict.fromkeys([*values, 'delay']))}"
         )
     if "delay" not in values and "delay" not in names:
         raise ValueError(
-            "the delay of this loop is None: give it a range, or set it with "
+            "the delay of this loop is None: give the delay a range, or a value with "
             "loop.replace(delay=...)"
         )
     return values
@@ -357,8 +359,9 @@ def refuse_discretised(controller: Controller, sample_time: float | None, what: 
     smooth = controller._filter
     if sample_time is not None and smooth is not None and smooth.discretisation is not None:
         raise ValueError(
-            f"{what} cannot run a filter in samples (discretisation={smooth.discretisation!r}): "
-            "leave its discretisation out, or take loops one by one"
+            f"{what} cannot have a filter that runs on samples "
+            f"(discretisation={smooth.discretisation!r}): leave discretisation out, or simulate "
+            "the loops one by one"
         )
 
 

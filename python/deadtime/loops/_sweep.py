@@ -130,7 +130,8 @@ class Sweep(ReadOnlyArrays):
             return self.metrics[name]
         except KeyError:
             raise KeyError(
-                f"{name!r}: this sweep holds {', '.join(self.metrics) or 'outputs, no metrics'}"
+                f"{name!r} is not in this sweep, which contains "
+                f"{', '.join(self.metrics) or 'outputs, no metrics'}"
             ) from None
 
     def best(self, metric: str = "settling_time") -> dict[str, float]:
@@ -154,7 +155,9 @@ class Sweep(ReadOnlyArrays):
         """
         measured = self[metric]
         if not np.isfinite(measured).any():
-            raise ValueError(f"no set has a {metric}: give a longer time, or change the ranges")
+            raise ValueError(
+                f"no set of parameters has a {metric}: give a longer time, or change the ranges"
+            )
         place = np.unravel_index(np.nanargmin(measured), self.shape)
         return {
             name: float(np.broadcast_to(array, self.shape)[place])
@@ -275,10 +278,12 @@ def sweep(
     common = _checked(loop, arrays)
     height = finite("amplitude", amplitude)
     if height == 0.0:
-        raise ValueError("amplitude=0: this is not a step; give a number other than zero")
+        raise ValueError("amplitude=0 is not a step: give a number other than zero")
     parts = (finite("rise", rise[0]), finite("rise", rise[1]))
     if not 0.0 <= parts[0] < parts[1]:
-        raise ValueError(f"rise={rise}: give two fractions of the step, the smaller one first")
+        raise ValueError(
+            f"rise={rise}: give two shares of the step, the smaller one first, such as (0.1, 0.9)"
+        )
     band = positive("settling", settling)
     sampled = 1.0 if "sample_time" in values else common.sample_time
     refuse_discretised(common.controller, sampled, "a sweep")
@@ -392,9 +397,7 @@ def _chosen(metrics: Sequence[str] | None, responses: bool) -> tuple[str, ...]:
     if metrics is None:
         return _METRICS
     if responses:
-        raise ValueError(
-            "metrics and responses: a sweep gives only one of them; leave the other out"
-        )
+        raise ValueError("a sweep gives either metrics or responses: leave one of the two out")
     if isinstance(metrics, str):
         raise TypeError(f"metrics={metrics!r}: give a sequence of names, such as ({metrics!r},)")
     known = (*_METRICS, *_STEP_FIGURES, *_LOAD_FIGURES)
@@ -408,8 +411,8 @@ def require_loop(loop: object) -> None:
     """Raise TypeError if `loop` is not a `ControlLoop`."""
     if not isinstance(loop, ControlLoop):
         raise TypeError(
-            f"a {type(loop).__name__} is no ControlLoop: write the plant as Integrator, FirstOrder "
-            "or RationalPlant, and give ControlLoop(plant, P(1.0), delay=...)"
+            f"a {type(loop).__name__} is not a ControlLoop: write the plant as Integrator, "
+            "FirstOrder or RationalPlant, and give ControlLoop(plant, P(1.0), delay=...)"
         )
 
 
@@ -423,14 +426,16 @@ def _sets(values: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], tuple[int,
         arrays[name] = arrays[name].reshape(-1, *[1] * (len(ranges) - place - 1 + behind))
     for name, array in arrays.items():
         if not np.isfinite(array).all():
-            raise ValueError(f"{name} holds {array[~np.isfinite(array)][0]}: give finite numbers")
+            raise ValueError(
+                f"{name} contains {array[~np.isfinite(array)][0]}: give finite numbers"
+            )
     try:
         shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
     except ValueError as error:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise ValueError(
-            f"the arrays do not broadcast: {shapes}; give equal lengths, or numpy.ix_ of them for "
-            "a grid"
+            f"the arrays do not broadcast: {shapes}. Give arrays of one length, or numpy.ix_ of "
+            "them for a grid"
         ) from error
     return arrays, shape
 
@@ -448,7 +453,7 @@ def _checked(loop: ControlLoop, arrays: Mapping[str, Array]) -> ControlLoop:
     # Most loops have a gain that is never zero.
     if not any(np.all(gain) for gain in given) and np.any(sum(map(np.abs, given)) == 0.0):
         raise ValueError(
-            f"one set has {', '.join(gains)} of zero, so its loop is open: give a gain other "
+            f"in one set {', '.join(gains)} is zero, so the loop is open: give a gain other "
             "than zero"
         )
     return loop
@@ -456,15 +461,17 @@ def _checked(loop: ControlLoop, arrays: Mapping[str, Array]) -> ControlLoop:
 
 def _times(time: ArrayLike | None, responses: bool) -> Array:
     if time is None:
-        raise ValueError("responses need output times: give an array of them as time")
+        raise ValueError("responses need output times: give an array of times as time")
     times = real_array("time", time)
     if times.ndim == 0 and not responses:
         return np.array([0.0, positive("time", float(times))])
     if times.ndim == 0:
-        raise ValueError(f"time={times}: responses need an array of output times")
+        raise ValueError(f"time={times}: responses need several output times, so give an array")
     times = np.array(increasing("time", times))
     if times.size < 2 and not responses:
-        raise ValueError("time has only one entry: give the first and the last time, or a number")
+        raise ValueError(
+            "time has only one entry: give several times, or only the last time as a number"
+        )
     if times.size == 0:
         raise ValueError("time is empty: give at least one output time")
     return times

@@ -10,28 +10,30 @@ from deadtime.loops import PV, ControlLoop, Integrator
 from deadtime.paper.comparison import Comparison, Verdict
 from deadtime.paper.reproduction import TITLES, Reproduction
 
-HEADS = ("where", "what", "printed", "ours", "verdict", "why, and with which model")
+HEADS = ("where", "what", "printed", "ours", "verdict", "reason and model")
 
 #: Captions of the figures.
 CAPTIONS = {
-    "table1": "The delays that the measured overshoots give: printed, by the dominant root, and by "
-    "the exact step response.",
-    "figure2": "Left: step responses of the loop. Middle: period and first peak with a hold or a "
-    "lag, divided by those of a delay alone with the same overshoot; the six rows of Table 1. "
-    "Right: how far one loop for all gains misses the overshoots of Table 1.",
-    "figure3": "Left: responses on both sides of the limit. Middle: the rightmost root. Right: "
-    "where a simulation in fixed steps sees the limit.",
-    "table2": "The overshoot of the altitude loop over its delay.",
+    "table1": "The delays that follow from the measured overshoots: as printed, by the "
+    "dominant root, and by the exact step response.",
+    "figure2": "Left: step responses of the loop. Middle: period and first peak with a hold or "
+    "a lag, for the six rows of Table 1. Each is divided by its value for a delay "
+    "alone with the same overshoot. Right: error of the overshoots of Table 1, if "
+    "one loop has to give all six.",
+    "figure3": "Left: responses on both sides of the stability limit. Middle: the rightmost "
+    "root. Right: the stability limit in simulations with fixed steps.",
+    "table2": "The overshoot of the altitude loop for each delay.",
     "figure6": "The responses of Table 2, and their peaks with the samples of the coarse model.",
-    "figure7": "Left: the loop with the delay that 2.3 % gives. Right: the delay that each "
-    "flight gives, in three ways.",
-    "gap": "From the delay by the dominant root to that by simulation.",
+    "figure7": "Left: the loop with the delay that gives an overshoot of 2.3 %. Right: the "
+    "delay from each flight, by three methods.",
+    "gap": "The contributions that lead from the delay by the dominant root to the delay by "
+    "simulation.",
     "figure8": "Responses at Kp = 4 and 5, without the limit of the speed.",
-    "figure9": "Roots of ten branches of W at Kp = 4 and 5.",
-    "figure10": "The rightmost root over the velocity gain, with an ideal derivative and with the "
-    "filter of the flights.",
-    "figure11": "Left: responses of the model of the flights. Right: where they enter the band of "
-    "2 % for good.",
+    "figure9": "Roots from ten branches of the Lambert W function at Kp = 4 and 5.",
+    "figure10": "The rightmost root for each velocity gain, with an ideal derivative and with "
+    "the filter of the flights.",
+    "figure11": "Left: responses of the model of the flights. Right: the time after which each "
+    "response stays within 2 %.",
 }
 
 #: The loop with velocity feedback, and the gains that its map shows at first.
@@ -61,7 +63,7 @@ def render_reproduction(found: Reproduction, figures: dict[str, Figure] | None =
     parts = found.parts
     return page(
         "paper/page.html",
-        title="A paper on delays in quadrotor control, reproduced",
+        title="The paper on delays in quadrotor control, reproduced",
         verdict=found.summary(),
         titles=TITLES,
         captions=CAPTIONS,

@@ -98,17 +98,17 @@ def _figure2(part: Figure2) -> Figure:
     middle.axhline(1.0, **REFERENCE)
     _legend(
         middle,
-        "Time scale at the same K and overshoot",
+        "Period and first peak at the same K and overshoot",
         xlabel="hold or lag / ms",
-        ylabel="times that of the delay alone",
+        ylabel="relative to a delay alone",
     )
     for fit, colour in zip(part.explanations, COLOURS, strict=False):
         right.plot(1e3 * fit.values, fit.misfits, color=colour, marker=".", label=fit.words)
     _legend(
         right,
-        "The overshoots of Table 1 by one loop",
+        "One loop for all overshoots of Table 1",
         xlabel="hold or lag / ms",
-        ylabel="misfit (rms) / % of the step",
+        ylabel="error of the overshoot (rms) / % of the step",
     )
     return figure
 
@@ -122,7 +122,7 @@ def _figure3(part: Figure3) -> Figure:
     left.set_ylim(-2.0, 4.0)
     _step_axes(left, "Exact responses")
     gains, roots = np.array(list(part.rightmost)), np.array(list(part.rightmost.values()))
-    middle.plot(gains, roots.real, color=COLOURS[0], label="Re of the rightmost root")
+    middle.plot(gains, roots.real, color=COLOURS[0], label="real part of the rightmost root")
     middle.axhline(0.0, **REFERENCE)
     middle.axvline(part.limit, color=COLOURS[1], lw=1.0, ls=":", label=f"K = {part.limit:.3f}")
     middle.set_ylim(-12.0, 3.0)
@@ -230,7 +230,7 @@ def _figure8(part: Figure8) -> Figure:
     figure, ax = new_figure(6.5, 3.8)
     _responses(ax, [(f"Kp = {gain:g}", one) for gain, one in part.responses.items()], COLOURS)
     ax.set_ylim(-4.0, 6.0)
-    _step_axes(ax, f"Td = 0.36 s; stable up to Kp = {part.limit:.3f}", " / m")
+    _step_axes(ax, f"Td = 0.36 s, stable up to Kp = {part.limit:.3f}", " / m")
     return figure
 
 
@@ -280,9 +280,9 @@ def _figure10(part: Figure10) -> Figure:
     ax.set_ylim(-4.2, 0.8)
     _legend(
         ax,
-        "Kp = 2, Td = 0.36 s; dots: the gains of the figure, stars: the best",
+        "Kp = 2, Td = 0.36 s; dots are the gains of the figure, stars the best gains",
         xlabel="Kv",
-        ylabel="Re of the rightmost root / (1/s)",
+        ylabel="real part of the rightmost root / (1/s)",
     )
     return figure
 
@@ -295,7 +295,7 @@ def _figure11(part: Figure11) -> Figure:
     for ax in (left, right):
         _responses(ax, labels, COLOURS)
         ax.axhspan(0.98, 1.02, color="0.9", zorder=0, label="± 2 %")
-    _responses(left, [("Kv = 0.3, no limit", part.unlimited)], COLOURS[2:], ls="--")
+    _responses(left, [("Kv = 0.3, without the limit", part.unlimited)], COLOURS[2:], ls="--")
     left.set_xlim(0.0, 6.0)
     _step_axes(left, "Model of the flights", " / m")
     for one, colour in zip(part.settling, COLOURS, strict=False):

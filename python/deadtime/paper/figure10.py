@@ -122,11 +122,13 @@ class Figure10(Part):
         """What the figure shows."""
         ideal, filtered = self.ideal, self.filtered
         return (
-            f"Kv = 0.3 is the most stable gain only among multiples of 0.1: the best is "
-            f"{ideal.best:.4f} ({ideal.best_abscissa:.3f} 1/s).",
-            f"The filter matters: at Kv = 0.3 the rightmost root moves from "
-            f"{_in_words(ideal.roots[0.3])} to {_in_words(filtered.roots[0.3])}. The best gain is "
-            f"{filtered.best:.3f} ({filtered.best_abscissa:.3f}), and the loop is stable up to "
+            "Kv = 0.3 is the most stable gain only if multiples of 0.1 are compared. The most "
+            f"stable gain is {ideal.best:.4f}, with a spectral abscissa of "
+            f"{ideal.best_abscissa:.3f} 1/s.",
+            "The filter matters. At Kv = 0.3 it moves the rightmost root from "
+            f"{_in_words(ideal.roots[0.3])} to {_in_words(filtered.roots[0.3])}. With the "
+            f"filter, the best gain is {filtered.best:.3f} (abscissa "
+            f"{filtered.best_abscissa:.3f} 1/s), and the loop is stable up to "
             f"{filtered.critical:.3f} instead of {ideal.critical:.3f}.",
         )
 
@@ -210,8 +212,8 @@ def _compared(ideal: Curve, filtered: Curve, complex_above: float) -> tuple[Comp
             "-3.323",
             ideal.roots[0.3].real,
             neutral,
-            note=f"text: -3.32, which agrees; -3.323 would need Td = {marker:.5f} s; the chain "
-            f"of the neutral loop lies at {math.log(0.3) / DELAY:.4f}",
+            note=f"The text has -3.32, which agrees. A root at -3.323 needs Td = {marker:.5f} "
+            f"s. The chain of the neutral loop is at {math.log(0.3) / DELAY:.4f}",
         ),
         Comparison.of_root(
             "Sec 4.4",
@@ -235,8 +237,8 @@ def _compared(ideal: Curve, filtered: Curve, complex_above: float) -> tuple[Comp
             "0.3",
             ideal.best,
             neutral,
-            note=f"the best of multiples of 0.1 is {on_grid:g}; with the filter the best is "
-            f"{filtered.best:.3f}",
+            note=f"Among multiples of 0.1 the best gain is {on_grid:g}. With the filter the "
+            f"best gain is {filtered.best:.3f}",
             abscissa=ideal.best_abscissa,
             filtered=filtered.best,
             filtered_abscissa=filtered.best_abscissa,
@@ -246,11 +248,14 @@ def _compared(ideal: Curve, filtered: Curve, complex_above: float) -> tuple[Comp
             'filter "has only a minor effect"',
             "minor",
             holds=moved < MINOR,
-            shown=f"{_in_words(ideal.roots[0.3])} → {_in_words(filtered.roots[0.3])} at Kv = 0.3",
-            model="filter of 38 rad/s, damping 1",
-            note=f"at Kv = 0.7 {ideal.roots[0.7].real:.3f} → {filtered.roots[0.7].real:.3f}; "
-            f"stable up to {ideal.critical:.4f} → {filtered.critical:.4f}; the best gain "
-            f"{ideal.best:.4f} → {filtered.best:.4f}; neutral → retarded",
+            shown=f"{_in_words(ideal.roots[0.3])}, with the filter "
+            f"{_in_words(filtered.roots[0.3])}, at Kv = 0.3",
+            model="filter of 38 rad/s with damping 1",
+            note=f"At Kv = 0.7 the filter changes the root from {ideal.roots[0.7].real:.3f} to "
+            f"{filtered.roots[0.7].real:.3f}. The largest stable Kv changes from "
+            f"{ideal.critical:.4f} to {filtered.critical:.4f}, and the best gain from "
+            f"{ideal.best:.4f} to {filtered.best:.4f}. The loop changes from neutral to "
+            "retarded",
             computed=filtered.roots[0.3],
         ),
         Comparison.of_statement(
@@ -260,7 +265,8 @@ def _compared(ideal: Curve, filtered: Curve, complex_above: float) -> tuple[Comp
             holds=abs(ideal.best - 0.5) < 0.05,
             shown=f"{ideal.best:.4f}",
             model=neutral,
-            note=f"at Kv = {complex_above:.3f} the rightmost root changes from real to a pair",
+            note=f"at Kv = {complex_above:.3f} the rightmost root changes from a real root to a "
+            "complex pair",
             computed=ideal.best,
             turns_complex=complex_above,
         ),

@@ -98,7 +98,8 @@ class Figure11(Part):
                 ),
             ),
             Grid(
-                f"Cutoffs of the filter of 38 rad/s; printed {CUTOFF} rad/s",
+                "Cutoff frequencies of the filter with poles at 38 rad/s; the paper prints "
+                f"{CUTOFF} rad/s",
                 ("where", "rad/s"),
                 tuple((name, f"{value:.2f}") for name, value in self.cutoffs.items()),
             ),
@@ -108,9 +109,10 @@ class Figure11(Part):
         """What the figure shows."""
         slow = self.settling[-1]
         return (
-            f"At Kv = 0.7 a ripple of the model peaks just outside the band: it settles after "
-            f"{slow.from_motion:.2f} s to 2 % and after {slow.wider:.2f} s to 2.1 %. The flight's "
-            f"{PRINTED[0.7]} s agrees with the latter, but such a number has little significance.",
+            "At Kv = 0.7 a ripple of the response ends just outside of the 2 % band. The model "
+            f"settles to 2 % after {slow.from_motion:.2f} s, and to 2.1 % after "
+            f"{slow.wider:.2f} s. The flight's {PRINTED[0.7]} s agrees with 2.1 %, but a "
+            "settling time that depends on such a small change is not meaningful.",
         )
 
 
@@ -172,7 +174,7 @@ def _compared(
     damping, corner = PAPER_FILTER.damping, PAPER_FILTER.omega
     poles = np.roots([1.0, 2.0 * damping * corner, corner**2])
     nearest = min(cutoffs.values(), key=lambda value: abs(value - float(CUTOFF)))
-    model = "Td = 0.36 s, filter, limit 1 m/s; from the start of the motion"
+    model = "Td = 0.36 s, filter, limit of 1 m/s, time from the start of the motion"
     return (
         Comparison.of_statement(
             "Sec 4.4",
@@ -181,8 +183,9 @@ def _compared(
             holds=info["overshoot"] < 1.0 and info["settling_time"] < 2.0,
             shown=f"{info['overshoot']:.2f} %, {info['settling_time']:.3f} s",
             model="filter, no limit, exact",
-            note=f"with the limit {settling[0].overshoot:.2f} %, {settling[0].from_step:.3f} s "
-            f"from the step, {settling[0].from_motion:.3f} s from the start of the motion",
+            note=f"with the limit: {settling[0].overshoot:.2f} % overshoot, settled "
+            f"{settling[0].from_step:.3f} s after the step and "
+            f"{settling[0].from_motion:.3f} s after the start of the motion",
             overshoot=info["overshoot"],
             settling_time=info["settling_time"],
         ),
@@ -206,8 +209,8 @@ def _compared(
             "filter cutoff from 38 rad/s",
             CUTOFF,
             nearest,
-            "the nearest of three edges of the filter",
-            note="5.68 rad/s does not follow from 38 rad/s: "
+            "the nearest of three definitions of the cutoff",
+            note="5.68 rad/s does not follow from poles at 38 rad/s, whose cutoffs are: "
             + ", ".join(f"{name} {value:.2f}" for name, value in cutoffs.items()),
         ),
         *(
@@ -217,8 +220,8 @@ def _compared(
                 PRINTED[one.gain],
                 one.from_motion,
                 model,
-                note=f"{one.from_step:.3f} s from the step; to 2.1 % instead of 2 % "
-                f"{one.wider:.3f} s",
+                note=f"{one.from_step:.3f} s after the step; {one.wider:.3f} s to 2.1 % instead "
+                "of 2 %",
                 from_step=one.from_step,
                 wider=one.wider,
             )

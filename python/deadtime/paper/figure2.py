@@ -118,7 +118,7 @@ class Figure2(Part):
                 cells.append(_in_ms(trial.delays))
             rows.append(tuple(cells))
         return Grid(
-            f"Delay by the method of Table 1 where the round trip is {1e3 * DELAY:g} ms",
+            f"Delay by the method of Table 1, with a round trip of {1e3 * DELAY:g} ms",
             ("K", *(scenario.words for scenario in SCENARIOS)),
             tuple(rows),
         )
@@ -138,8 +138,8 @@ class Figure2(Part):
                 )
             )
         return Grid(
-            "Time scale at the same K and overshoot, 1 for the delay alone",
-            ("with", "period", "first peak", "delay left", "K"),
+            "Period and first peak at the same K and overshoot, relative to a delay alone",
+            ("with", "period", "first peak", "remaining delay", "K"),
             tuple(rows),
         )
 
@@ -158,7 +158,7 @@ class Figure2(Part):
                 )
         measured = " ".join(f"{value:.0f}" for value in PRINTED_OVERSHOOTS.values())
         return Grid(
-            "All six overshoots of Table 1 by one loop",
+            "One loop for all six overshoots of Table 1",
             ("model", "value", "delay", "misfit (rms)", f"overshoots (measured {measured})"),
             tuple(dict.fromkeys(rows)),
         )
@@ -168,32 +168,33 @@ class Figure2(Part):
         hold, lag, both = self.explanations
         held = [one.period_ratio for one in (*self.stretches, *self.fitted) if one.hold > 0.0]
         return (
-            "With a delay alone, K and the overshoot fix the time scale. At the same K and "
-            "overshoot, another time scale proves a second time constant in the loop.",
-            f"A hold has a small effect: {1e3 * HOLDS[-1]:g} ms stretch the period by "
-            f"{_span(self._periods(hold=HOLDS[-1]))}, and the first peak may even come earlier. "
-            f"A lag has a large effect: {1e3 * LAGS[-1]:g} ms stretch it by "
-            f"{_span(self._periods(lag=LAGS[-1]))}.",
-            f"The overshoots of Table 1 indicate a hold and no lag. One delay for all "
-            f"gains leaves {hold.misfits[0]:.1f} points; a hold of "
-            f"{1e3 * hold.values[hold.best]:.0f} ms with {1e3 * hold.delays[hold.best]:.0f} ms of "
-            f"delay leaves {hold.misfits[hold.best]:.1f}, and its period is "
-            f"{_span(one.period_ratio for one in self.fitted)} times as long; every lag makes it "
-            f"worse ({lag.misfits[-1]:.1f} points at {1e3 * lag.values[-1]:.0f} ms), also beside "
-            f"that hold ({both.misfits[-1]:.1f} at {1e3 * both.values[-1]:.0f} ms). The fit by a "
-            "hold is a narrow minimum: it is no proof of a hold of that length.",
-            f"So a hold explains periods of {_span(held)} times that of the delay alone, for "
-            "these overshoots. More needs a lag, which Table 1 contradicts, or a model clock that "
-            "does not run in real time: at a rate c it stretches all times by 1/c, while the "
-            "overshoot is that of c K Td.",
-            "The paper's data do not decide between them: it prints no time of a peak, no sample "
-            "time of the two computers and no round trip. The rise of the delay in Table 1 from "
-            "0.09 to 0.13 s is not caused by its method: at a constant round trip the method's "
-            f"estimates rise by {1e3 * self._rise():.1f} ms from K = 5 to 10. Runs at different "
-            "hours, of round trips that differ by a third, would explain it as well.",
-            "With a jitter of 20 ms and the newest answer in use, the effective delay is shorter. "
-            f"It is {1e3 * self._won():.0f} ms below that of a constant round trip of the same "
-            "mean.",
+            "With a delay alone, K and the overshoot determine the period. So another period "
+            "at the same K and overshoot proves a second time constant in the loop.",
+            f"A hold has a small effect. With a hold of {1e3 * HOLDS[-1]:g} ms the period is "
+            f"{_span(self._periods(hold=HOLDS[-1]))} times as long, and the first peak may even "
+            f"come earlier. A lag has a large effect: with a lag of {1e3 * LAGS[-1]:g} ms the "
+            f"period is {_span(self._periods(lag=LAGS[-1]))} times as long.",
+            "The overshoots of Table 1 indicate a hold, but not a lag. One delay for all gains "
+            f"leaves an error of {hold.misfits[0]:.1f} points. A hold of "
+            f"{1e3 * hold.values[hold.best]:.0f} ms with a delay of "
+            f"{1e3 * hold.delays[hold.best]:.0f} ms leaves {hold.misfits[hold.best]:.1f} "
+            f"points, with a period {_span(one.period_ratio for one in self.fitted)} times as "
+            f"long. Every lag increases the error, to {lag.misfits[-1]:.1f} points at "
+            f"{1e3 * lag.values[-1]:.0f} ms. With that hold, a lag also increases the error "
+            f"({both.misfits[-1]:.1f} points at {1e3 * both.values[-1]:.0f} ms). The minimum "
+            "over the hold is narrow, so it does not prove a hold of that length.",
+            f"So for these overshoots, a hold explains periods {_span(held)} times as long as "
+            "with a delay alone. Longer periods need a lag, which Table 1 contradicts, or a "
+            "model clock that does not run in real time. A clock at a rate c stretches all "
+            "times by 1/c, and the overshoot is then that of c K Td.",
+            "The paper's data do not decide between these two. The paper prints no peak time, "
+            "no sample time of the two computers and no round trip. In Table 1 the delay rises "
+            "from 0.09 to 0.13 s. The method does not cause this rise: at a constant round "
+            f"trip, its estimates rise only by {1e3 * self._rise():.1f} ms from K = 5 to 10. "
+            "Another explanation is that the runs were made at different hours, with round "
+            "trips that differ by a third.",
+            "With a jitter of 20 ms and the newest answer in use, the effective delay is "
+            f"{1e3 * self._won():.0f} ms shorter than with a constant round trip.",
         )
 
     def _periods(self, hold: float = 0.0, lag: float = 0.0) -> list[float]:

@@ -82,11 +82,11 @@ class Figure3(Part):
         fits = [f"{1e3 * h:g}" for h, k in self.coarse_limits.items() if 18.0 < k <= 19.0]
         low, high = (1e3 * math.pi / (2.0 * gain) for gain in (19.0, 18.0))
         return (
-            f"The loop loses stability at K = {self.limit:.3f}. A simulation that is stable at 18 "
-            f"and not at 19 has a delay of {low:.1f} to {high:.1f} ms instead of 100. Or its steps "
-            f"are too coarse (of those tried: {', '.join(fits)} ms).",
-            f"With the command held for 65 ms the limit is {self.held_limit:.2f}: leaving out the "
-            "hold errs on the unsafe side.",
+            f"The loop becomes unstable at K = {self.limit:.3f}. A simulation that is stable at "
+            f"18 but not at 19 has a delay of {low:.1f} to {high:.1f} ms instead of 100 ms. Or "
+            f"its steps are too coarse, such as {', '.join(fits)} ms.",
+            f"If each command is held for 65 ms, the limit is {self.held_limit:.2f}. So a limit "
+            "without the hold is too high, which is unsafe.",
         )
 
 
@@ -164,7 +164,7 @@ def figure3() -> Figure3:
                 (15.0, 16.0),
                 limit,
                 "K Td = π/2",
-                note="text and caption disagree; the limit lies between them",
+                note="text and caption disagree, and the limit is between their values",
             ),
             Comparison.of_limits(
                 "Fig 3 left",
@@ -173,8 +173,8 @@ def figure3() -> Figure3:
                 (18.0, 19.0),
                 limit,
                 "exact",
-                note=f"a fixed-step simulation has its limit there with steps of "
-                f"{', '.join(f'{1e3 * step:g}' for step in fits)} ms; converged ones do not",
+                note="fixed-step simulations have this limit only with coarse steps, such as "
+                f"{', '.join(f'{1e3 * step:g}' for step in fits)} ms",
                 **{f"coarse_{1e3 * step:g}_ms": gain for step, gain in limits.items()},
             ),
         ),

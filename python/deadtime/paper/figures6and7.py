@@ -42,8 +42,9 @@ class Figure6(Part):
     def findings(self) -> tuple[str, ...]:
         """What the figure shows."""
         return (
-            "The responses of Table 2. Three of the seven delays lie within 0.13 ms of one "
-            "another, which neither the figure nor a recording at 65 ms can resolve.",
+            "The responses of Table 2. Three of the seven delays differ by less than 0.13 ms. "
+            "Neither the figure nor a recording with a row every 65 ms can show this "
+            "difference.",
         )
 
 
@@ -139,9 +140,9 @@ class Figure7(Part):
         spread = 100.0 * (max(delays) - min(delays)) / max(delays)
         four = 100.0 * (max(delays[:4]) - min(delays[:4])) / max(delays[:4])
         return (
-            f"Four flights agree within {four:.2g} % of the delay. The fifth, "
-            f"{self.flights[-1].overshoot:g} %, is left out without a reason: with it the "
-            f"delays spread over {spread:.0f} %.",
+            f"The delays from four flights agree within {four:.2g} %. The fifth flight, with an "
+            f"overshoot of {self.flights[-1].overshoot:g} %, is left out without a reason. With "
+            f"this flight, the delays spread over {spread:.0f} %.",
         )
 
 
@@ -177,8 +178,8 @@ def figure7() -> Figure7:
                 f"flight Mo {printed} %",
                 printed,
                 None,
-                "delay from the overshoot: dominant root, exact, exact with the limit",
-                shown=f"Td {flight.dominant:.4f}, {flight.linear:.4f}, {flight.saturated:.4f} s",
+                "delay from the overshoot: by the dominant root, exact, exact with the limit",
+                shown=f"Td = {flight.dominant:.4f}, {flight.linear:.4f}, {flight.saturated:.4f} s",
                 lambert=flight.dominant,
                 exact_linear=flight.linear,
                 exact_saturated=flight.saturated,

@@ -47,11 +47,11 @@ class Figure8(Part):
         """Both limits."""
         return (
             Grid(
-                "Kp at which the loop loses stability, Td = 0.36 s",
+                "Kp at which the loop becomes unstable, Td = 0.36 s",
                 ("loop", "Kp"),
                 (
                     ("continuous", f"{self.limit:.4f}"),
-                    ("command held for 65 ms", f"{self.held_limit:.4f}"),
+                    ("each command held for 65 ms", f"{self.held_limit:.4f}"),
                 ),
             ),
         )
@@ -60,8 +60,9 @@ class Figure8(Part):
         """What the figure shows."""
         margin = 100.0 * (self.held_limit / GAINS[0] - 1.0)
         return (
-            f"Kp = 4 is stable, but in the sampled loop by {margin:.1f} % only: with the hold of "
-            f"65 ms the limit is {self.held_limit:.3f}, not {self.limit:.3f}.",
+            f"Kp = 4 is stable, but in the sampled loop only {margin:.1f} % below the limit. "
+            f"With the hold of 65 ms the limit is {self.held_limit:.3f} instead of "
+            f"{self.limit:.3f}.",
         )
 
 
@@ -94,7 +95,8 @@ def figure8() -> Figure8:
                 GAINS,
                 limit,
                 "π/(2 Td)",
-                note="the first whole number that is unstable; 4 is the last stable one",
+                note="with Kp = 5, the first whole number, the loop is unstable; with Kp = 4 it "
+                "is stable",
             ),
         ),
     )

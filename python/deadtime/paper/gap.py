@@ -55,9 +55,9 @@ class Gap(Part):
         """The contributions to the difference of the estimates."""
         delays = (self.linear, self.saturated, self.simulation)
         steps = (
-            ("the exact response for the dominant root", "dominant root"),
-            ("the speed limited to 1 m/s", "saturation"),
-            ("coarse steps for exact simulation", "coarse steps"),
+            ("exact response instead of the dominant root", "dominant root"),
+            ("speed limited to 1 m/s", "saturation"),
+            ("coarse steps instead of an exact simulation", "coarse steps"),
         )
         rows = [("dominant root (Lambert W)", "", f"{self.dominant:.5f} s")]
         for (words, name), delay in zip(steps, delays, strict=True):
@@ -66,7 +66,8 @@ class Gap(Part):
         rows.append(("together", f"{1e3 * whole:+.2f} ms", ""))
         return (
             Grid(
-                f"From one estimate to the other, overshoot {OVERSHOOT} %",
+                "Contributions to the difference of the two estimates, at an overshoot of "
+                f"{OVERSHOOT} %",
                 ("step", "adds", "delay"),
                 tuple(rows),
             ),
@@ -77,10 +78,10 @@ class Gap(Part):
         added = {name: 1e3 * value for name, value in self.parts.items()}
         whole = 1e3 * (self.simulation - self.dominant)
         return (
-            f"The two estimates differ by {whole:.2f} ms from the same overshoot: "
-            f"{added['saturation']:+.2f} ms is the limit of the speed, "
-            f"{added['dominant root']:+.2f} ms the dominant root in place of the whole response, "
-            f"{added['coarse steps']:+.2f} ms the coarse steps. Noise does not contribute.",
+            f"From the same overshoot, the two estimates differ by {whole:.2f} ms. The limit of "
+            f"the speed contributes {added['saturation']:+.2f} ms, the exact response instead "
+            f"of the dominant root {added['dominant root']:+.2f} ms, and the coarse steps "
+            f"{added['coarse steps']:+.2f} ms. Noise does not contribute.",
         )
 
 
@@ -115,7 +116,7 @@ def _compared(found: Gap, part: float) -> tuple[Comparison, ...]:
     damping = dtm.damping_ratio(part)
     whole = found.simulation - found.dominant
     shares = ", ".join(f"{name} {1e3 * value:+.2f} ms" for name, value in found.parts.items())
-    coarse = "coarse steps, as Table 2"
+    coarse = "coarse steps, as in Table 2"
     return (
         Comparison.of_number(
             "Sec 4.2",
@@ -123,7 +124,7 @@ def _compared(found: Gap, part: float) -> tuple[Comparison, ...]:
             "0.3682",
             found.simulation,
             coarse,
-            note=f"exact simulation with the limit: {found.saturated:.5f} s",
+            note=f"exact simulation with the limit gives {found.saturated:.5f} s",
             exact=found.saturated,
         ),
         Comparison.of_number("Sec 4.3", "zeta from Mo=2.30 %", "0.7684", damping, "eq. 5"),
@@ -133,7 +134,7 @@ def _compared(found: Gap, part: float) -> tuple[Comparison, ...]:
             "0.3598",
             found.dominant,
             "dominant root, eqs. 3, 5, 6",
-            note=f"exact linear response: {found.linear:.5f} s",
+            note=f"exact linear response gives {found.linear:.5f} s",
             exact=found.linear,
         ),
         Comparison.of_statement(
@@ -144,7 +145,8 @@ def _compared(found: Gap, part: float) -> tuple[Comparison, ...]:
             holds=abs(found.parts["saturation"]) < 0.5 * whole,
             shown=shares,
             model="exact simulation with and without the limit",
-            note="the limit of the speed explains it; the same overshoot was used for both",
+            note="the cause is the limit of the speed, because both estimates use the same "
+            "overshoot",
             computed=whole,
             **{name.replace(" ", "_"): value for name, value in found.parts.items()},
         ),

@@ -79,7 +79,7 @@ def internet_loop(
     for name, value in {"sample_time": sample_time, "duration": duration}.items():
         positive(name, value)
     if loss >= 1.0:
-        raise ValueError(f"loss={loss}: give a number below 1, so that answers arrive")
+        raise ValueError(f"loss={loss}: give a share below 1, because some answers have to arrive")
     before, after = math.ceil(REST / sample_time), math.ceil(duration / sample_time)
     time = sample_time * np.arange(-before, after + 1)
     reference = np.where(time >= 0.0, 1.0, 0.0)

@@ -81,12 +81,12 @@ class Reproduction:
         numbers = (Verdict.EXACT, Verdict.PARTLY, Verdict.DIFFERENT)
         statements = (Verdict.CONFIRMED, Verdict.CONTRADICTED)
         return (
-            f"{sum(counts[one] for one in numbers)} printed numbers: "
-            f"{counts[Verdict.EXACT]} reproduced to every digit, {counts[Verdict.PARTLY]} to fewer "
-            f"digits, {counts[Verdict.DIFFERENT]} not. "
-            f"{sum(counts[one] for one in statements)} statements: {counts[Verdict.CONFIRMED]} "
-            f"confirmed, {counts[Verdict.CONTRADICTED]} not supported. "
-            f"{counts[Verdict.MEASURED]} measurements, which are not compared."
+            f"{sum(counts[one] for one in numbers)} printed numbers: {counts[Verdict.EXACT]} "
+            f"reproduced to every digit, {counts[Verdict.PARTLY]} to fewer digits, "
+            f"{counts[Verdict.DIFFERENT]} not. {sum(counts[one] for one in statements)} "
+            f"statements: {counts[Verdict.CONFIRMED]} were confirmed, "
+            f"{counts[Verdict.CONTRADICTED]} not supported. {counts[Verdict.MEASURED]} "
+            "measurements cannot be compared."
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -160,7 +160,9 @@ def reproduce(only: Iterable[str] | None = None, progress: Stages = False) -> Re
     names = list(PARTS) if only is None else list(dict.fromkeys(only))
     unknown = [name for name in names if name not in PARTS]
     if unknown:
-        raise ValueError(f"{', '.join(unknown)}: not one of {', '.join(PARTS)}")
+        raise ValueError(
+            f"{', '.join(unknown)} cannot be reproduced: give some of {', '.join(PARTS)}"
+        )
     if not names:
         raise ValueError(f"only is empty: give one or more of {', '.join(PARTS)}")
     parts = {}

@@ -107,11 +107,12 @@ class Table1(Part):
         """What the table shows."""
         exact = [row.exact_delay for row in self.rows]
         return (
-            "The column of damping ratios is not equation (5) of the printed overshoots. It is the "
-            "damping ratio of the dominant root at the delay that the paper uses further on.",
-            f"By the exact step response the delays run from {1e3 * min(exact):.1f} to "
-            f"{1e3 * max(exact):.1f} ms: the trend with K is not caused by the dominant root (see "
-            "Figure 2).",
+            "The column of damping ratios does not follow from equation (5) and the printed "
+            "overshoots. It contains the damping ratio of the dominant root at the delay that "
+            "the paper uses further on.",
+            f"By the exact step response the delays are {1e3 * min(exact):.1f} to "
+            f"{1e3 * max(exact):.1f} ms. So the dominant root does not cause their increase "
+            "with K (see Figure 2).",
         )
 
 
@@ -179,7 +180,7 @@ def _without_overshoot() -> Comparison:
         holds=largest < UNSEEN,
         shown=f"at most {largest:.2f} %",
         model=f"exact, Td = {delay:g} s",
-        note="overshoot begins at K Td = 1/e and is first visible (0.05 %) near K Td = 0.4",
+        note="an overshoot begins at K Td = 1/e, and is first visible (0.05 %) near K Td = 0.4",
         computed=largest,
     )
 
@@ -197,7 +198,7 @@ def _compared(row: Table1Row) -> list[Comparison]:
             damping,
             row.root_damping,
             f"dominant root at {at}",
-            note=f"equation (5) of the printed overshoot gives {row.damping:.4f}",
+            note=f"equation (5) gives {row.damping:.4f} for the printed overshoot",
         ),
         Comparison.of_number(
             "Table 1",
@@ -205,7 +206,7 @@ def _compared(row: Table1Row) -> list[Comparison]:
             delay,
             row.delay,
             "dominant root, eqs. 3, 5, 6",
-            note=f"exact step response: {row.exact_delay:.5f} s",
+            note=f"exact step response gives {row.exact_delay:.5f} s",
             exact=row.exact_delay,
         ),
         Comparison.of_root(
@@ -214,6 +215,6 @@ def _compared(row: Table1Row) -> list[Comparison]:
             root,
             row.root,
             f"W0 at {at}",
-            note=f"the printed pair has a damping ratio of {printed_damping:.4f}",
+            note=f"the printed pair of roots has a damping ratio of {printed_damping:.4f}",
         ),
     ]

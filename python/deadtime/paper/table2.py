@@ -143,7 +143,7 @@ class Table2(Part):
         """Overshoots: printed, coarse, exact, and without the limit."""
         return (
             Grid(
-                "Overshoot (%) over the delay",
+                "Overshoot (%) for each delay",
                 ("N", "Td", "printed", "coarse steps", "exact", "exact, no limit"),
                 tuple(
                     (
@@ -164,10 +164,12 @@ class Table2(Part):
         off = max(abs(row.printed - row.exact) for row in self.rows)
         unlimited = max(abs(row.printed - row.unlimited) for row in self.rows)
         return (
-            "Coarse fixed steps of one sample with the speed limited to 1 m/s give every printed "
-            f"digit; they differ by up to {off:.3f} points from the exact response.",
-            f"Without the limit the overshoots differ by up to {unlimited:.3f} points: the limit "
-            "was active. The order of the solver and the phase of the step are not identified.",
+            "A simulation with coarse steps of one sample and a speed limit of 1 m/s gives "
+            f"every printed digit. Its overshoots differ by up to {off:.3f} points from the "
+            "exact response.",
+            f"Without the limit the overshoots differ by up to {unlimited:.3f} points, so the "
+            "limit was active. The order of the solver and the phase of the step cannot be "
+            "identified.",
         )
 
 
@@ -203,7 +205,7 @@ def table2() -> Table2:
                 percent,
                 row.coarse,
                 "coarse fixed steps (0.065 s, ode3), limit 1 m/s",
-                note=f"exact: {row.exact:.3f} %, without the limit {row.unlimited:.3f} %",
+                note=f"exact: {row.exact:.3f} %, exact without the limit: {row.unlimited:.3f} %",
                 exact=row.exact,
                 unlimited=row.unlimited,
             ),

@@ -127,8 +127,8 @@ def time_scale(loop: dtm.ControlLoop) -> Stretch:
     alone = _with_overshoot(gain, overshoot, 0.0, 0.0)
     if alone is None:
         raise ValueError(
-            f"no delay alone gives the loop with K={gain:g} the overshoot of {overshoot:.3g} %: "
-            "give one that overshoots, by less than 100 %"
+            f"with K={gain:g}, no delay alone gives an overshoot of {overshoot:.3g} %: give an "
+            "overshoot between 0 and 100 %"
         )
     period = _period(loop)
     return Stretch(
@@ -251,7 +251,9 @@ def explain(name: str, values: NDArray[np.float64], *, hold: float = 0.0) -> Exp
     measured = np.array(list(PRINTED_OVERSHOOTS.values()))
     delays = np.arange(DELAY_STEP, LONGEST_DELAY, DELAY_STEP)
     if name not in ("hold", "lag") or (name == "hold" and hold):
-        raise ValueError(f"name={name!r}, hold={hold}: give a hold, or a lag with or without one")
+        raise ValueError(
+            f"name={name!r}, hold={hold}: give a hold, or a lag with or without a hold"
+        )
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp=1.0), delay=0.1, sample_time=hold or None)
     tried = np.concatenate([[0.0], np.asarray(values, dtype=float)])
     best_delays, misfits, overshoots = [], [], []

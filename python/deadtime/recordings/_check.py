@@ -123,7 +123,9 @@ class RecordingCheck(ReadOnlyArrays):
             f"{self.rows} rows {seconds(self.row_time)} apart",
             f"{missing} missing" if missing else "none missing",
             _LAWS[self.law],
-            f"at its limit in {100.0 * self.saturated:.2g} %" if self.saturated else "",
+            f"the command is at its limit in {100.0 * self.saturated:.2g} % of the rows"
+            if self.saturated
+            else "",
         ]
         return ", ".join(part for part in parts if part)
 

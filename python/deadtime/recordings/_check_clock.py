@@ -96,7 +96,7 @@ def _unit(
     slow_log = own is not None and row_time < own
     slow_controller = columns.time[-1] - columns.time[0] > SAMPLES * sample_time
     apart = (
-        f"the rows are {row_time:g} apart in the unit of the time stamps, and sample_time is "
+        f"the rows are {row_time:g} apart in the unit of the time stamps, but sample_time is "
         f"{sample_time:g} s"
     )
     for factor, unit in UNITS.items():
@@ -104,17 +104,18 @@ def _unit(
             return Finding(
                 "time_unit",
                 "refused",
-                f"{apart}, a factor of {factor:.0f}: the time stamps are {unit}; divide them by "
-                f"{factor:.0f}",
-                f"delays would come out {factor:.0f} times too long, and gains as much too small",
+                f"{apart}, a factor of {factor:.0f}. The time stamps are probably {unit}: "
+                f"divide the time stamps by {factor:.0f}",
+                f"delays would be {factor:.0f} times too long, and gains too small by the "
+                "same factor",
             )
         if not slow_controller and 0.45 < row_time / sample_time * factor < 2.2:
             return Finding(
                 "time_unit",
                 "refused",
-                f"{apart}, a factor of {factor:.0f}: sample_time is in {unit}, or the time stamps "
-                f"were divided by {factor:.0f} too much; give both in seconds",
-                f"delays would come out up to {factor:.0f} times too short",
+                f"{apart}, a factor of {factor:.0f}. Either sample_time is in {unit}, or the "
+                f"time stamps were divided by {factor:.0f} without need: give both in seconds",
+                f"delays would be up to {factor:.0f} times too short",
             )
     return None
 
@@ -129,10 +130,10 @@ def _near_samples(rows: Rows, sample_time: float, whole: int, ratio: float) -> I
             f"the rows are {seconds(rows.mean_time)} apart, {100.0 * off:.2g} % "
             f"{'more' if ratio > 1.0 else 'less'} than "
             + ("the sample_time" if whole == 1 else f"{whole} times the sample_time")
-            + f" of {seconds(sample_time)}: if the time stamps are right, give sample_time="
-            f"{rows.mean_time / whole:.6g}; if the controller is, scale the time stamps",
-            "if the wrong one of the two clocks is used, gain and delay have an error of "
-            f"{100.0 * off:.2g} %",
+            + f" of {seconds(sample_time)}. If the time stamps are right, give "
+            f"sample_time={rows.mean_time / whole:.6g}. If the controller's clock is right, "
+            "scale the time stamps",
+            f"with the wrong clock, gain and delay have an error of {100.0 * off:.2g} %",
             share=off,
         )
     if whole > 1:
@@ -140,11 +141,11 @@ def _near_samples(rows: Rows, sample_time: float, whole: int, ratio: float) -> I
         yield Finding(
             "lower_rate",
             "warning",
-            f"the recording holds one row for {whole} samples of the controller, which are "
-            f"{seconds(sample_time)} apart: "
+            f"the controller samples every {seconds(sample_time)}, but only one of {whole} "
+            "samples has a row: "
             + ("every other command is" if whole == 2 else f"{whole - 1} of {whole} commands are")
-            + " missing; log at the rate of the controller",
-            "if each command is held until the next row, the delay comes out up to "
+            + " missing. Log at the rate of the controller",
+            "if a fit holds each command until the next row, the delay is up to "
             f"{seconds(late)} too short",
         )
 
@@ -160,24 +161,23 @@ def _other_spacing(
             yield _no_such_hold(told, soon, sample_time)
         return
     apart = (
-        f"the rows are {seconds(rows.mean_time)} apart and sample_time is {seconds(sample_time)}"
+        f"the rows are {seconds(rows.mean_time)} apart, but sample_time is {seconds(sample_time)}"
     )
     shift = f"the delay is uncertain by up to half a sample time, {seconds(0.5 * sample_time)}"
     if command.law in ("exact", "late", "early"):
         yield Finding(
             "sample_time",
             "refused",
-            f"{apart}, but the command is computed anew on each row: give sample_time="
-            f"{rows.mean_time:.6g}",
-            "a wrong hold is attributed to the delay: half the difference of the two, "
+            f"{apart}, but the command changes on each row: give sample_time={rows.mean_time:.6g}",
+            "a wrong hold changes the estimated delay by half the difference, "
             f"{seconds(0.5 * abs(rows.mean_time - sample_time))}",
         )
     elif rows.mean_time > sample_time:
         yield Finding(
             "other_rate",
             "warning",
-            f"{apart}, so the rows are not the samples of the controller: commands between them "
-            "are missing; log at its rate",
+            f"{apart}. So the rows are not the samples of the controller, and commands between "
+            "rows are missing. Log at the rate of the controller",
             f"{shift} and by half a row, {seconds(0.5 * rows.mean_time)}",
             0.5 * (sample_time + rows.mean_time),
         )
@@ -185,8 +185,8 @@ def _other_spacing(
         yield Finding(
             "other_rate",
             "warning",
-            f"{apart}, so the rows are not the samples of the controller, and without the "
-            "command the times of its changes are not known; log the command",
+            f"{apart}. So the rows are not the samples of the controller, and the times at "
+            "which the command changes are not known. Log the command",
             shift,
             0.5 * sample_time,
         )
@@ -198,9 +198,9 @@ def _other_spacing(
             yield Finding(
                 "other_rate",
                 "note",
-                f"{apart}, and the command holds over several rows: the controller samples where "
-                "it changes",
-                "none, if a fit takes the times of the commands from their changes",
+                f"{apart}. The command stays constant over several rows, so the controller "
+                "samples at the rows where it changes",
+                "none, if a fit uses the times at which the command changes",
             )
 
 
@@ -213,9 +213,9 @@ def _no_such_hold(told: str, soon: float, sample_time: float) -> Finding:
     return Finding(
         "sample_time",
         "refused",
-        f"{told}, but {100.0 * soon:.0f} % of the changes of the command come sooner after "
-        "the previous change: check sample_time, or leave it out",
-        "the model would contain a hold that is not in the loop, which counts as "
+        f"{told}, but {100.0 * soon:.0f} % of the changes of the command follow the previous "
+        "change after a shorter time. Check sample_time, or leave sample_time out",
+        "the model would contain a hold that the loop does not have, which acts like "
         f"{seconds(0.5 * sample_time)} of delay",
     )
 
@@ -230,9 +230,10 @@ def _without_sample_time(
             yield Finding(
                 "time_unit",
                 "warning",
-                f"the rows are {rows.row_time:g} s apart and last {span:g} s, and a loop with "
-                f"these gains takes about {own:.3g} s: check that the time stamps are seconds",
-                "a delay comes out wrong by the same factor as the times",
+                f"the rows are {rows.row_time:g} s apart and last {span:g} s, but a loop with "
+                f"these gains takes about {own:.3g} s to respond. Check that the time stamps "
+                "are seconds",
+                "the delay would be wrong by the same factor as the time stamps",
                 math.inf,
             )
             return
@@ -241,12 +242,12 @@ def _without_sample_time(
         yield Finding(
             "sample_time_seen",
             "warning" if held else "note",
-            f"the command is that of the controller on rows {seconds(clock.sample_time_seen)} "
-            "apart: "
+            "the command follows from the controller if the rows are "
+            f"{seconds(clock.sample_time_seen)} apart, and "
             + ("the rows are its samples" if held else "the rows may be its samples")
-            + f"; give sample_time={clock.sample_time_seen:.6g}",
-            "a hold that is left out adds up to half a row, "
-            f"{seconds(0.5 * clock.sample_time_seen)}, to the delay",
+            + f". Give sample_time={clock.sample_time_seen:.6g}",
+            "without its hold in the model, the delay is up to half a row, "
+            f"{seconds(0.5 * clock.sample_time_seen)}, too long",
         )
 
 

@@ -181,36 +181,34 @@ def command_findings(
             "reference_is_command",
             "note",
             "the reference equals the command in every row, so the recording shows a plant "
-            "without its controller",
-            "the response to the command can be fitted, but the closed loop cannot",
+            "without a controller",
+            "a fit can use the response to the command, but not the closed loop",
         )
     elif command.law in ("late", "early"):
         late = command.law == "late"
         yield Finding(
             f"command_{command.law}",
             "warning",
-            "the command of each row is the one computed from the row "
-            f"{'before' if late else 'after'} it: command and output were logged one row, "
-            f"{seconds(rows.row_time)}, apart",
-            "without a correction, the estimated delay after the command is up to one row too "
+            f"each command was computed from the row {'before' if late else 'after'} its own "
+            f"row, so command and output were logged one row, {seconds(rows.row_time)}, apart",
+            "without a correction, the estimated delay is up to one row too "
             f"{'short' if late else 'long'}",
         )
     elif command.law == "approximate":
         yield Finding(
             "command_approximate",
             "note",
-            "the command is that of the controller except for small differences. Either the "
-            "controller used another output than the recorded one, or noise was added to the "
-            "recording",
-            "none on a fit to the logged command; for a fit of the loop the noise is that of the "
-            "recording: Waveform(noise='recording')",
+            "the command is nearly the command of the controller. Either the controller used "
+            "another output than the recorded output, or noise was added to the recording",
+            "none on a fit to the logged command. A fit of the loop needs "
+            "Waveform(noise='recording'), because the noise is only in the recording",
         )
     elif command.law == "differs" and _is_relay(columns.command):
         yield Finding(
             "relay",
             "note",
-            "the command has only two values, like that of a relay",
-            "a fit of the loop would be wrong; use method='relay' or 'output_error'",
+            "the command has only two values, so the controller is probably a relay",
+            "a fit of the loop would be wrong. Use method='relay' or 'output_error'",
         )
         return
     elif command.law == "differs":
@@ -222,10 +220,10 @@ def command_findings(
         yield Finding(
             "command_strays",
             "warning",
-            f"the command differs from that of the controller in {command.strays} of "
-            f"{columns.time.size} rows: either it was logged at another time, or it did not "
-            "come from this controller",
-            "the command in each such row may belong to the next or the previous row, "
+            f"in {command.strays} of {columns.time.size} rows the command differs from the "
+            "command that the controller would give. Either the command was logged at another "
+            "time, or it did not come from this controller",
+            "in each such row the command may belong to the next or the previous row, "
             f"{seconds(rows.row_time)} away",
             rows.row_time * command.strays / columns.time.size,
         )
@@ -242,16 +240,20 @@ def _is_relay(command: Array | None) -> bool:
 def _other_law(line: Line | None, loop: ControlLoop) -> Finding:
     """A command that is not that of the controller: another sign, unit or gain, or unrelated."""
     loose = (
-        "a fit of the loop would attribute the difference to the delay; a fit of the "
-        "response to the logged command (method='output_error') does not depend on it"
+        "a fit of the loop would attribute the difference to the delay. A fit of the response "
+        "to the logged command (method='output_error') does not depend on the controller"
     )
     if line is None or line.explained < EXPLAINED:
-        part = "" if line is None else f", which explains {100.0 * line.explained:.0f} % of it"
+        part = (
+            ""
+            if line is None
+            else (f", which explains {100.0 * line.explained:.0f} % of the command")
+        )
         return Finding(
             "command_differs",
             "warning",
-            f"the command is not Kp (reference - output){part}: another controller, other columns, "
-            "or a reference that is not logged",
+            f"the command is not Kp (reference - output){part}. The recording is from another "
+            "controller, or has other columns, or its reference is not logged",
             loose,
             math.inf,
         )
@@ -263,16 +265,16 @@ def _other_law(line: Line | None, loop: ControlLoop) -> Finding:
                 return Finding(
                     "command_unit",
                     "refused",
-                    f"the command is {slope:.4g} times Kp (reference - output): {units}, or the "
-                    f"reverse; divide the command by {slope:.4g}",
+                    f"the command is {slope:.4g} times Kp (reference - output). The "
+                    f"units differ ({units}, or the reverse): divide the command by {slope:.4g}",
                     f"the gain would be wrong by a factor of {times:.4g}",
                 )
     if slope < 0.0:
         return Finding(
             "command_sign",
             "refused",
-            f"the command is {slope:.4g} times Kp (reference - output): it has the other sign; "
-            "multiply the command or both other columns by -1",
+            f"the command is {slope:.4g} times Kp (reference - output), so its sign is wrong: "
+            "multiply either the command or both other columns by -1",
             "the gain would be negative, and no delay would fit",
         )
     Kp = loop.parameters["Kp"]
@@ -280,16 +282,16 @@ def _other_law(line: Line | None, loop: ControlLoop) -> Finding:
         return Finding(
             "command_offset",
             "warning",
-            f"the command is Kp (reference - output) {line.offset:+.3g}: a constant was added, "
-            "such as a trim, or the controller had another reference",
+            f"the command is Kp (reference - output) {line.offset:+.3g}. Either a constant such "
+            "as a trim was added, or the controller had another reference",
             loose,
             math.inf,
         )
     return Finding(
         "command_gain",
         "warning",
-        f"the command is {slope:.4g} times Kp (reference - output): the gain of the controller was "
-        f"{slope * Kp:.4g}, not Kp={Kp:g}",
+        f"the command is {slope:.4g} times Kp (reference - output), so the gain of the "
+        f"controller was {slope * Kp:.4g} instead of Kp={Kp:g}",
         loose,
         math.inf,
     )
@@ -304,17 +306,17 @@ def _limit_findings(columns: Columns, command: Command, loop: ControlLoop) -> It
         yield Finding(
             "limit_exceeded",
             "refused",
-            f"the command reaches {largest:.6g}, beyond limit={loop.limit:g}: give the limit "
+            f"the command reaches {largest:.6g}, although limit={loop.limit:g}: give the limit "
             "of the controller, or record the command after its limit",
-            "the model would contain a limit that was not there, and the estimated delay would "
-            "be too short",
+            "the model would contain a limit that the loop did not have, so the estimated "
+            "delay would be too short",
         )
     elif seen is not None and (loop.limit is None or seen < (1.0 - 1e-3) * loop.limit - step):
         told = "no limit was given" if loop.limit is None else f"limit={loop.limit:g} was given"
         yield Finding(
             "limit_seen",
             "warning" if loop.limit is None else "refused",
-            f"the command stops at {seen:.6g} where the controller asks for more, and {told}: give "
-            f"limit={seen:.6g}",
+            f"the command stops at {seen:.6g}, although the controller demands more, and "
+            f"{told}: give limit={seen:.6g}",
             "a fit of the loop would attribute the slower response to the delay",
         )

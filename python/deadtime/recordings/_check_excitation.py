@@ -37,9 +37,9 @@ def copied_setpoint(reference: Array, output: Array) -> Finding | None:
     return Finding(
         "setpoint_copied",
         "refused",
-        f"the reference equals the output in {copied} of the {moving.size} rows in which the "
-        "output moves. Either the setpoint is inactive in these rows, or one column was read "
-        "twice. Choose a window in which the controller follows a setpoint of its own",
+        f"in {copied} of the {moving.size} rows in which the output moves, the reference equals "
+        "the output. Either the setpoint is inactive in these rows, or one column was read "
+        "twice. Choose a window in which the controller follows a setpoint",
         "the delay would be estimated as zero",
     )
 
@@ -51,16 +51,16 @@ def no_motion(output: Array, command: Array | None = None) -> Finding | None:
             "command_constant",
             "refused",
             f"the command is {command[0]:g} throughout the window, so it does not excite the "
-            "vehicle; choose a window in which the command changes",
-            "every delay would fit",
+            "vehicle. Choose a window in which the command changes",
+            "any delay would fit",
         )
     if float(np.ptp(output)) == 0.0:
         return Finding(
             "output_constant",
             "refused",
-            f"the output is {output[0]:g} throughout the window, so the vehicle did not move; "
-            "choose another window, and check the column",
-            "every delay would fit",
+            f"the output is {output[0]:g} throughout the window, so the vehicle did not move. "
+            "Choose another window, and check the column",
+            "any delay would fit",
         )
     return None
 
@@ -78,8 +78,8 @@ def no_excitation(reference: Array, output: Array, *, in_motion: bool) -> Findin
         "no_step",
         "refused",
         f"the reference is {reference[0]:g} throughout the window, so it does not excite the "
-        "loop; choose a window with a step",
-        "only noise and wind would determine the estimated delay",
+        "loop. Choose a window with a step",
+        "the estimated delay would depend only on noise and wind",
     )
 
 
@@ -98,8 +98,8 @@ def excitation_findings(
                 still,
                 code="saturated",
                 message="the command is at its limit throughout the window, so it does not "
-                "excite the vehicle; choose a window with a smaller step, or only the end of "
-                "this window",
+                "excite the vehicle. Choose a window with a smaller step, or only the "
+                "end of this window",
             )
         yield still
         return
@@ -125,9 +125,9 @@ def _range_finding(columns: Columns, loop: ControlLoop) -> Iterator[Finding]:
     yield Finding(
         "output_range",
         "warning",
-        f"the output moves over {ratio:.3g} times the range of the reference. In a well damped "
-        "loop with an integrating plant it reaches its reference: check that both "
-        "are in one unit and belong to one loop, and that the loop was closed",
-        "a fit of the loop may end at any delay",
+        f"the range of the output is {ratio:.3g} times the range of the reference, but an "
+        "output that follows its reference has about the same range. Check the units, that "
+        "reference and output belong to one loop, and that the loop was closed",
+        "a fit of the loop may give any delay",
         math.inf,
     )

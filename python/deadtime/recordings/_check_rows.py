@@ -177,8 +177,9 @@ def row_findings(columns: Columns, rows: Rows, loop: ControlLoop) -> Iterator[Fi
         longest = max(holes, key=lambda hole: hole.missing)
         length = float(columns.time[longest.after] - columns.time[longest.before])
         what = (
-            f"{len(holes)} {'hole' if len(holes) == 1 else 'holes'} in the rows, the longest of "
-            f"{seconds(length)} after {columns.time[longest.before]:g} s, {longest.missing} rows"
+            f"the rows have {len(holes)} {'hole' if len(holes) == 1 else 'holes'}. The longest "
+            f"is {seconds(length)} ({longest.missing} rows), after "
+            f"{columns.time[longest.before]:g} s"
         )
         yield _gap_finding("hole", what, holes, columns, loop)
     if rows.repeated.size:
@@ -186,11 +187,11 @@ def row_findings(columns: Columns, rows: Rows, loop: ControlLoop) -> Iterator[Fi
         yield Finding(
             "rows_repeated",
             "warning" if share > MANY_REPEATS else "note",
-            f"{rows.repeated.size} rows repeat the row before them while the output moves, "
-            f"{100.0 * share:.2g} % of the moving rows: they hold no new measurement; leave them "
-            "out, or log each measurement when it arrives",
-            f"on average the output is {seconds(share * rows.row_time, 3)} older than its row "
-            "says, which adds to the delay",
+            f"{rows.repeated.size} rows repeat the previous row while the output moves "
+            f"({100.0 * share:.2g} % of the moving rows), so they contain no new measurement. "
+            "Leave these rows out, or log each measurement when it arrives",
+            f"on average the output is {seconds(share * rows.row_time, 3)} older than the time "
+            "of its row, which adds to the delay",
             share * rows.row_time,
         )
 
@@ -200,20 +201,20 @@ def _stamp_findings(columns: Columns, rows: Rows) -> Iterator[Finding]:
         yield Finding(
             "stamps_nominal",
             "note",
-            f"the time stamps are exactly {seconds(rows.row_time)} apart, which measured "
-            "times rarely are",
-            "if the time stamps are planned and not measured, jitter cannot be seen",
+            f"the time stamps are exactly {seconds(rows.row_time)} apart, but measured times "
+            "rarely are",
+            "if the time stamps are planned times and not measured, jitter cannot be seen",
         )
     elif rows.stamps == "jittered":
         rate = float(np.quantile(np.abs(np.diff(columns.output)) / np.diff(columns.time), 0.95))
         yield Finding(
             "jitter",
             "warning" if rows.jitter > MUCH_JITTER * rows.row_time else "note",
-            f"the time between rows, {seconds(rows.row_time)}, varies with a standard deviation of "
+            f"the time between rows is {seconds(rows.row_time)}, with a standard deviation of "
             f"{seconds(rows.jitter, 2)}",
-            "a fit that assumes even samples has an error of this size in the time of each "
-            f"command. Errors in the stamps act like noise of {rate * rows.jitter:.2g} where the "
-            f"output moves at {rate:.2g} per second",
+            "a fit that assumes evenly spaced samples has an error of this size in the time of "
+            f"each command. At an output speed of {rate:.2g} per second, the errors act like "
+            f"noise of {rate * rows.jitter:.2g}",
         )
 
 
@@ -224,7 +225,10 @@ def _gap_finding(
     commands = columns.commands(loop)
     if commands is None:
         return Finding(
-            code, "warning", what, "the command in between is unknown, and is not logged elsewhere"
+            code,
+            "warning",
+            what,
+            "the command between these rows is unknown, because it is not logged elsewhere",
         )
     before = np.array([hole.before for hole in holes])
     change, moved = (np.abs(part[before + 1] - part[before]) for part in (commands, columns.output))
@@ -238,14 +242,14 @@ def _gap_finding(
             code,
             "note",
             what,
-            "the command is nearly the same on both sides, so little is lost",
+            "the command is nearly the same before and after, so little is lost",
         )
     worst = int(np.argmax(np.where(same, -1.0, change * length)))
     return Finding(
         code,
         "warning",
         what,
-        "the command in between is unknown: if the last one is held over a gap, delay and gain "
-        f"come out wrong; it changes by {float(change[worst]):.3g} over {seconds(length[worst])} "
-        f"after {columns.time[before[worst]]:g} s",
+        "the command in a gap is unknown. If a fit holds the last command over the gap, delay "
+        f"and gain are wrong. The largest change is {float(change[worst]):.3g} over "
+        f"{seconds(length[worst])}, after {columns.time[before[worst]]:g} s",
     )

@@ -43,7 +43,9 @@ class Finding:
     share: float = 0.0
 
     def __str__(self) -> str:
-        return f"{self.severity}: {self.message}" + (f"; {self.effect}" if self.effect else "")
+        return f"{self.severity}: {self.message}" + (
+            f". Effect: {self.effect}" if self.effect else ""
+        )
 
 
 class Columns(NamedTuple):

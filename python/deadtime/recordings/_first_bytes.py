@@ -84,37 +84,37 @@ def _kinds() -> list[Kind]:
     bags = (
         ("MCAP", "an MCAP file", _starts(b"\x89MCAP0\r\n")),
         ("ROS 1 bag", "a ROS bag", _starts(b"#ROSBAG V")),
-        ("ROS 2 bag", "an SQLite database, as a bag of ROS 2 is", _starts(b"SQLite format 3\0")),
+        ("ROS 2 bag", "an SQLite database, like a bag of ROS 2", _starts(b"SQLite format 3\0")),
     )
     others = (
         (
-            "a zip archive, as Excel's .xlsx is",
+            "a zip archive, like an .xlsx file of Excel",
             b"PK\x03\x04",
-            "unpack it, or save the sheet as CSV",
+            "unpack the archive, or save the sheet as CSV",
         ),
         ("an Excel sheet (.xls)", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "save the sheet as CSV"),
         (
-            "an HDF5 file that MATLAB has not written",
+            "an HDF5 file that does not come from MATLAB",
             b"\x89HDF\r\n\x1a\n",
-            "give its columns as a dict of arrays",
+            "give the columns as a dict of arrays",
         ),
         ("a file of one NumPy array", b"\x93NUMPY", "give the columns of numpy.load() as a dict"),
         ("packed by bzip2", b"BZh", "unpack it"),
         ("packed by xz", b"\xfd7zXZ\0", "unpack it"),
         ("packed by zstd", b"\x28\xb5\x2f\xfd", "unpack it"),
         ("a 7z archive", b"7z\xbc\xaf\x27\x1c", "unpack it"),
-        ("a Feather file of version 1", b"FEA1", "write version 2, or Parquet"),
-        ("a PNG picture", b"\x89PNG\r\n\x1a\n", "give the numbers behind it"),
-        ("a JPEG picture", b"\xff\xd8\xff", "give the numbers behind it"),
-        ("a PDF document", b"%PDF-", "give the numbers behind it"),
+        ("a Feather file of version 1", b"FEA1", "save it as version 2, or as Parquet"),
+        ("a PNG picture", b"\x89PNG\r\n\x1a\n", "give a file with the numbers of the plot"),
+        ("a JPEG picture", b"\xff\xd8\xff", "give a file with the numbers of the plot"),
+        ("a PDF document", b"%PDF-", "give a file with the numbers of the plot"),
     )
     return [
-        Kind("", LFS_WHAT, _starts(LFS), None, "run `git lfs pull` where it was cloned"),
+        Kind("", LFS_WHAT, _starts(LFS), None, "run `git lfs pull` in its repository"),
         *(Kind(name, what, begins, "open_log") for name, what, begins in logs),
         *(Kind(name, what, begins, "open_bag") for name, what, begins in bags),
         *(Kind("", what, _starts(first), None, advice) for what, first, advice in others),
         *(Kind(name, what, begins, "read_recording") for name, what, begins in tables),
-        Kind("text", "a text, and no log of an autopilot", _is_text, "read_recording"),
+        Kind("text", "a text, but not a log of an autopilot", _is_text, "read_recording"),
     ]
 
 
@@ -127,7 +127,7 @@ def opened(path: str | os.PathLike[str]) -> FileIO:
     try:
         stream = open(path, "rb", buffering=0)  # noqa: SIM115 - given to the caller
     except FileNotFoundError:
-        raise RecordingError(f"there is no file {path}") from None
+        raise RecordingError(f"the file {path} does not exist") from None
     except IsADirectoryError:
         raise RecordingError(f"{path} is a folder: give a file") from None
     except OSError as error:
@@ -154,7 +154,7 @@ def is_table(path: str | os.PathLike[str]) -> bool:
 
 def _too_large(path: object) -> RecordingError:
     return RecordingError(
-        f"{path} has more than {LARGEST_FILE} bytes, or no end: give a part of it"
+        f"{path} has more than {LARGEST_FILE} bytes, or never ends: give a part of this file"
     )
 
 

@@ -78,7 +78,9 @@ def growing_rows(file: Path, columns: Sequence[str], silence: float) -> Iterator
     heads, delimiter = header_of(file, _in_latin_1(first), columns, None)
     for name in columns:
         if name not in heads:
-            raise RecordingError(f"{file} has no column {name!r}, only {', '.join(heads)}")
+            raise RecordingError(
+                f"{file} has no column {name!r}. Its columns are {', '.join(heads)}"
+            )
     places = [heads.index(name) for name in columns]
     numbers = _Numbers()
     for number, line in kept:
@@ -91,7 +93,8 @@ def growing_rows(file: Path, columns: Sequence[str], silence: float) -> Iterator
             shown = line.strip() if len(line) <= SHOWN else f"{line[:SHOWN]}..."
             reason = str(error) if isinstance(error, _MarkError) else "give a finite number"
             raise RecordingError(
-                f"line {number} of {file} is {shown!r}: {reason} for each of {', '.join(columns)}"
+                f"line {number} of {file} is {shown!r}: {reason} for each of the columns "
+                f"{', '.join(columns)}"
             ) from None
         yield Row(when, output, command)
 
@@ -134,7 +137,7 @@ def _lines(file: Path, silence: float) -> Iterator[str]:
                 if len(line) > LONGEST:
                     raise RecordingError(
                         f"line {count + 1} of {file} has more than {LONGEST} characters, so "
-                        "it is not a line of a table"
+                        "this is not a line of a table"
                     )
                 count += 1
             count -= 1
@@ -151,7 +154,7 @@ def _decoder(file: Path, head: bytes) -> io.IncrementalNewlineDecoder:
     if kind is None:
         raise not_text(file)
     if kind != "text":
-        raise RecordingError(f"{file} is a file of {kind}, but only a text file can be followed")
+        raise RecordingError(f"{file} is a file of {kind}, but --follow can read only a text file")
     # Bytes that are not UTF-8 are kept, as those of Latin-1 in a header.
     name, errors = (
         ("utf-16", "replace") if head.startswith(UTF_16) else ("utf-8-sig", "surrogateescape")

@@ -95,6 +95,6 @@ def _refuse_changes(name: str, values: NDArray[Any], gone: NDArray[np.bool_], wh
 def _refuse(name: str, rows: NDArray[np.intp], what: str) -> None:
     if rows.size:
         raise RecordingError(
-            f"row {rows[0]} {what}, and the {name} changes in this gap at an unknown time; "
-            "fill in the missing values, or choose a window without them"
+            f"row {rows[0]} {what}, and the {name} changes in this gap at an unknown time. Fill "
+            "in the missing values, or choose a window without missing values"
         )

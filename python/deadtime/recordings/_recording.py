@@ -140,7 +140,7 @@ class Recording(ReadOnlyArrays):
     ) -> None:
         if command is not None and sent is not None:
             raise TypeError(
-                "both the command of each row and the commands between rows are given: give "
+                "the command of each row and the commands between rows are both given: give "
                 "only one of the two"
             )
         if reference is None:
@@ -154,7 +154,7 @@ class Recording(ReadOnlyArrays):
         }
         lengths = {name: array.size for name, array in arrays.items()}
         if len(set(lengths.values())) > 1:
-            raise RecordingError(f"the columns of a recording differ in length: {lengths}")
+            raise RecordingError(f"the columns of a recording have different lengths: {lengths}")
         _check_time(arrays["time"])
         _check_missing(arrays)
         commands = None
@@ -226,9 +226,9 @@ class Recording(ReadOnlyArrays):
         last = int(np.searchsorted(self.time, high + slack, side="right"))
         if last - first < MINIMUM_SAMPLES:
             raise RecordingError(
-                f"the window ({start}, {stop}) s holds {max(0, last - first)} samples, at least "
-                f"{MINIMUM_SAMPLES} are needed: the recording runs from {self.time[0]:g} to "
-                f"{self.time[-1]:g} s"
+                f"the window ({start}, {stop}) s contains {max(0, last - first)} samples, but "
+                f"at least {MINIMUM_SAMPLES} are needed. The recording runs from "
+                f"{self.time[0]:g} to {self.time[-1]:g} s"
             )
         return slice(first, last)
 
@@ -252,8 +252,8 @@ class Recording(ReadOnlyArrays):
         """
         if not self.has_reference:
             raise RecordingError(
-                "the recording has no reference, which this method needs: name its column, or "
-                "estimate without a loop: dtm.estimate_delay(recording)"
+                "the recording has no reference, which this method needs. Name the column of "
+                "the reference, or estimate without a loop: dtm.estimate_delay(recording)"
             )
         columns = self._columns()
         held = HELD if self.sent is None else ("reference",)
@@ -301,14 +301,14 @@ class Recording(ReadOnlyArrays):
         >>> check.refused, check.findings[0].code
         (True, 'time_unit')
         >>> print(check.findings[0].effect)
-        delays would come out 1000 times too long, and gains as much too small
+        delays would be 1000 times too long, and gains too small by the same factor
         """
         from deadtime.loops import ControlLoop
         from deadtime.recordings._check import check_columns
         from deadtime.recordings._findings import Columns
 
         if not isinstance(loop, ControlLoop):
-            raise TypeError(f"loop must be a ControlLoop, got {type(loop).__name__}")
+            raise TypeError(f"loop must be a ControlLoop, not {type(loop).__name__}")
         open_interval("window", window)
         low, high = (None, None) if window is None else window
         whole = self.complete()
@@ -427,20 +427,22 @@ def _column(
     except (TypeError, ValueError) as error:
         raise RecordingError(f"the {name} is not an array of numbers: {error}") from None
     if array.ndim != 1:
-        raise RecordingError(f"the {name} has shape {array.shape}: give a column (n,)")
+        raise RecordingError(f"the {name} has shape {array.shape}: give a one-dimensional array")
     if array.size < fewest:
-        raise RecordingError(f"the {name} has {array.size} samples, at least {fewest} are needed")
+        raise RecordingError(
+            f"the {name} has {array.size} samples, but at least {fewest} are needed"
+        )
     bad = np.flatnonzero(np.isinf(array) if may_miss else ~np.isfinite(array))
     if bad.size:
         raise RecordingError(
-            f"the {name} is {array[bad[0]]} at row {bad[0]} ({bad.size} such values): leave these "
-            "rows out, or choose a window without them"
+            f"the {name} is {array[bad[0]]} at row {bad[0]} ({bad.size} values are like this): "
+            "leave these rows out, or choose a window without them"
         )
     far = np.flatnonzero(np.abs(array) > LARGEST)
     if far.size:
         raise RecordingError(
-            f"the {name} reaches {array[far[0]]:g}, but values beyond {LARGEST:g} may "
-            "overflow: use another unit"
+            f"the {name} reaches {array[far[0]]:g}, but values above {LARGEST:g} may overflow: "
+            "use another unit"
         )
     array.flags.writeable = False
     return array
@@ -451,8 +453,8 @@ def _check_missing(columns: dict[str, NDArray[np.float64]]) -> None:
     known = int(np.count_nonzero(~np.isnan(columns["output"])))
     if known < MINIMUM_SAMPLES:
         raise RecordingError(
-            f"the output is known in {known} of {columns['output'].size} rows, at least "
-            f"{MINIMUM_SAMPLES} are needed"
+            f"the output is known in {known} of {columns['output'].size} rows, but at least "
+            f"{MINIMUM_SAMPLES} rows are needed"
         )
 
 
@@ -460,7 +462,8 @@ def _sent(time: ArrayLike, values: ArrayLike) -> SentCommands:
     found = SentCommands(_column("time of the commands", time, 1), _column("commands", values, 1))
     if found.time.size != found.values.size:
         raise RecordingError(
-            f"{found.values.size} commands were sent at {found.time.size} times: give one time each"
+            f"{found.values.size} commands were sent at {found.time.size} times: give one "
+            "time for each command"
         )
     _check_time(found.time, "time of the commands")
     return found
@@ -470,8 +473,8 @@ def _last_sent(sent: SentCommands, time: NDArray[np.float64]) -> NDArray[np.floa
     """The command that holds at each row."""
     if sent.time[0] > time[0]:
         raise RecordingError(
-            f"the first command is sent at {sent.time[0]:g} s, after the first row at {time[0]:g} "
-            "s: begin the recording at a row by which one was sent"
+            f"the first command is sent at {sent.time[0]:g} s, after the first row at "
+            f"{time[0]:g} s: begin the recording at a row after the first command"
         )
     found: NDArray[np.float64] = sent.values[np.searchsorted(sent.time, time, side="right") - 1]
     found.flags.writeable = False
@@ -484,6 +487,6 @@ def _check_time(time: NDArray[np.float64], name: str = "time") -> None:
         row = int(backward[0]) + 1
         what = "repeats" if time[row] == time[row - 1] else "goes back"
         raise RecordingError(
-            f"the {name} {what} at row {row}: {time[row - 1]!r} is followed by {time[row]!r} "
-            f"({backward.size} such places); sort the rows and keep one of each time stamp"
+            f"at row {row} the {name} {what}: {time[row - 1]} is followed by {time[row]} "
+            f"({backward.size} such rows). Sort the rows, and keep one row of each time stamp"
         )

@@ -98,8 +98,8 @@ def _described(path: object, text: bytes) -> dict[str, Any]:
             return {"source": source, "units": units, "command": None, "sent": (times, values)}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise RecordingError(
-            f"{path} was not written by Recording.save: read it by dtm.read_recording, with the "
-            "names of its columns"
+            f"{path} was not written by Recording.save. Read this file with dtm.read_recording, "
+            "and give the names of its columns"
         ) from None
     return {"source": source, "units": units}
 

@@ -48,11 +48,11 @@ def _described(study: Study) -> str:
         f"{_controlled(study)}"
     )
     if loop.sample_time is not None:
-        words += f", the command held for {1e3 * loop.sample_time:g} ms"
+        words += f", each command held for {1e3 * loop.sample_time:g} ms"
     if loop.limit is not None:
         words += f" and limited to ±{loop.limit:g}"
     if study.window is not None:
-        words += f"; the estimates are from {study.window[0]:g} to {study.window[1]:g} s"
+        words += f"; estimated from {study.window[0]:g} to {study.window[1]:g} s"
     return words + "."
 
 
@@ -78,11 +78,12 @@ def _map(study: Study) -> Figure:
 def _map_caption(study: Study) -> str:
     delays = study.designed.delays
     return (
-        f"Spectral abscissa of the fitted loop with its hold, at a delay of "
-        f"{delays[len(delays) // 2]:.3f} s; without colour it is unstable. The star is the design, "
-        f"which is stable for every delay tried from {min(delays):.3f} to {max(delays):.3f} s. "
-        f"Proportional control alone is stable up to Kp = {study.held_limit:.3f} with the hold "
-        f"({study.continuous_limit:.3f} without the hold in the model)."
+        "Spectral abscissa of the fitted loop with its hold, at a delay of "
+        f"{delays[len(delays) // 2]:.3f} s. Cells without colour are unstable. The star marks "
+        "the designed gains, which are stable for all delays that were tried, "
+        f"{min(delays):.3f} to {max(delays):.3f} s. Proportional control alone is stable up to "
+        f"Kp = {study.held_limit:.3f} with the hold, and up to Kp = "
+        f"{study.continuous_limit:.3f} without the hold in the model."
     )
 
 

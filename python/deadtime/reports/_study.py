@@ -157,13 +157,13 @@ class Study:
             if self.verdict == "reliable"
             else f"Indication: the delay of the loop is about {rough(late, 's')}{parts}, "
             f"{NOT_CLAIMED}; {fit.reason}.",
-            f"Under proportional control it is unstable above Kp = {self.held_limit:.2f}: keep Kp "
-            f"below {self.safe_gain():.2f}.",
-            f"Try {gains}: with these gains a step "
+            f"Under proportional control the loop is unstable above Kp = {self.held_limit:.2f}, "
+            f"so keep Kp below {self.safe_gain():.2f}.",
+            f"Try {gains}. With these gains a step "
             f"{_settles(self.responses['designed for the delay'])}.",
-            f"The loop stays stable up to {self.gain_margin:.1f} times the estimated gain, or a "
-            f"delay of {self.largest_delay:.2f} s.",
-            "With gains designed without the delay a step "
+            f"The loop stays stable up to {self.gain_margin:.1f} times the estimated gain, or "
+            f"up to a delay of {self.largest_delay:.2f} s.",
+            "With gains that were designed without the delay, a step "
             f"{_settles(self.responses['designed without the delay'])}.",
         ]
         return " ".join(sentences)

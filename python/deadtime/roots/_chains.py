@@ -142,9 +142,9 @@ class Chain(ReadOnlyArrays):
         """
         index = np.asarray(unmasked("n", n))
         if index.dtype.kind not in "iu":
-            raise TypeError(f"n of dtype {index.dtype}: give whole numbers")
+            raise TypeError(f"n has the dtype {index.dtype}: give whole numbers")
         if index.size and index.min() < 0:
-            raise ValueError(f"n={index.min()}: roots are numbered from 0 upwards")
+            raise ValueError(f"n={index.min()}: roots are numbered from 0, so give 0 or more")
         if self._difference is None:
             v = self.offset + 1j * (self._phase + self.spacing * index)
         else:

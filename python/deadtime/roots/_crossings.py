@@ -130,7 +130,9 @@ class Crossings(ReadOnlyArrays):
         if len(self) > len(shown):
             shown.append(f"and {len(self) - len(shown)} more")
         shown = shown or ["none"]
-        shown += [f"not listed from {low:.6g} to {high:.6g}" for low, high in self.unlisted]
+        shown += [
+            f"crossings from {low:.6g} to {high:.6g} are not listed" for low, high in self.unlisted
+        ]
         return f"<Crossings of {within}: {', '.join(shown)}>"
 
 
@@ -261,14 +263,14 @@ def delay_margin(
         return margin_of_family(loop, numbers_at(at))
     if at is not None:
         raise TypeError(
-            "at= gives the parameters of an equation, but a loop already has its parameters: "
-            "leave at out"
+            "at= gives values to the parameters of an equation, but the parameters of a loop "
+            "have values already: leave at out"
         )
     found = getattr(loop, "_delay_margin", None)
     if found is None:
         raise TypeError(
-            f"loop of type {type(loop).__name__}: give a ControlLoop, a TransferFunction, or an "
-            "expression with the parameters of dtm.parameters('...')"
+            f"loop is of type {type(loop).__name__}: give a ControlLoop, a TransferFunction, or an "
+            "expression with parameters from dtm.parameters('...')"
         )
     margin: float = found()
     return margin
@@ -281,8 +283,9 @@ def margin_of_family(family: ParametricQuasiPolynomial, at: Mapping[str, float])
     delays = {name for _, _, (_, slopes) in family._terms for name, _ in slopes}
     if len(delays) != 1:
         raise ValueError(
-            f"{len(delays)} parameters are delays ({', '.join(sorted(delays)) or 'none'}): "
-            "keep one of them, and replace the others by numbers in the equation"
+            f"crossings need exactly one delay as a parameter, but there are {len(delays)} "
+            f"({', '.join(sorted(delays)) or 'none'}): keep one, and replace the others by "
+            "numbers in the equation"
         )
     (name,) = delays
     start = at[name]
@@ -295,8 +298,9 @@ def _one_range(ranges: Any) -> tuple[str, Range]:
         raise TypeError(f"ranges={ranges!r}: give a dict such as {{'Kp': (0, 6)}}")
     if len(ranges) != 1:
         raise ValueError(
-            f"ranges for {len(ranges)} parameters ({', '.join(map(str, ranges))}) are given, "
-            "but crossings need exactly one; for two, use stability_map and its boundaries"
+            f"crossings need a range of exactly one parameter, but ranges of {len(ranges)} "
+            f"parameters ({', '.join(map(str, ranges))}) are given. For two parameters, use "
+            "stability_map and the boundaries of the map"
         )
     ((name, given),) = ranges.items()
     return name, interval(name, given)

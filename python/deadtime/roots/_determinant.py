@@ -67,9 +67,10 @@ def expanded_and_exact(
     states = size - int(bordered)
     if states > LARGEST:
         raise NotExpandedError(
-            f"the determinant of {states} states is not expanded, only of up to {LARGEST}, "
-            "because rounding of its coefficients would change its roots too much. For any "
-            "number of states, use poles(), rightmost(), is_stable() or frequency_response()"
+            f"the determinant of {states} states is not expanded, because rounding its "
+            f"coefficients would change its roots too much. At most {LARGEST} states are "
+            "expanded. For any number of states, use poles(), rightmost(), is_stable() or "
+            "frequency_response()"
         )
     # One power of two makes integers of all entries.
     shift = max(
@@ -86,7 +87,7 @@ def expanded_and_exact(
         raise ValueError(
             "the determinant of the characteristic matrix is zero for every s, so the "
             "equations do not determine the state. Look for a row of E, N and A that is zero "
-            "or repeated"
+            "or occurs twice"
         )
     h = _rounded(exact, shift**size)
     terms = {
@@ -98,10 +99,11 @@ def expanded_and_exact(
     growth = _growth(entries, h)
     if growth > _MOST_GROWTH:
         raise NotExpandedError(
-            f"expanding the determinant of these {states} states could move its roots {growth:.1e} "
-            f"times as far as rounding the entries does, above {_MOST_GROWTH:.0e}: scale time or "
-            "the states so that the entries are of similar size, or ask for poles(), rightmost() "
-            "and frequency_response(), which do without"
+            f"expanding the determinant of these {states} states could move its roots "
+            f"{growth:.1e} times as far as rounding the entries does. At most "
+            f"{_MOST_GROWTH:.0e} times is allowed. Scale time or the states so that all entries "
+            "have similar sizes. Or use poles(), rightmost() and frequency_response(), which "
+            "do not need the expansion"
         )
     return h, terms == exact
 
@@ -145,7 +147,8 @@ def _rounded(exact: _Exact, scale: int) -> QuasiPolynomial:
             coefficients[delays.index(tau), k] = float(Fraction(value, scale))
         except OverflowError as error:
             raise NotExpandedError(
-                "a coefficient of the determinant is beyond 1e308: scale time or the equations"
+                "a coefficient of the determinant is beyond 1e308: use another unit of "
+                "time, or scale the equations"
             ) from error
     return QuasiPolynomial(coefficients, delays)
 

@@ -49,12 +49,14 @@ class NoExponential:
             if ufunc in (np.equal, np.not_equal):
                 return ufunc is np.not_equal
         raise TypeError(
-            f"numpy.{ufunc.__name__} takes no {type(self).__name__}: give numbers, or values of it "
-            "at given s"
+            f"numpy.{ufunc.__name__} does not work on a {type(self).__name__}: give numbers, "
+            "such as the values of the expression at given s"
         )
 
     def __rpow__(self, base: object) -> NoReturn:
-        raise TypeError(f"{base!r} to the power of an expression in s: {self._spelling()}")
+        raise TypeError(
+            f"{base!r} cannot be raised to the power of an expression in s. {self._spelling()}"
+        )
 
     def __float__(self) -> NoReturn:
-        raise TypeError(f"an expression in s is not a number: {self._spelling()}")
+        raise TypeError(f"an expression in s is not a number. {self._spelling()}")

@@ -35,8 +35,8 @@ def family_of(
     made = getattr(system, "_family_of", None)
     if made is None:
         raise TypeError(
-            f"family of type {type(system).__name__}: give a ControlLoop, or an expression with "
-            "the parameters of dtm.parameters('...')"
+            f"family is of type {type(system).__name__}: give a ControlLoop, or an expression with "
+            "parameters from dtm.parameters('...')"
         )
     values = numbers_at(at, names)
     family: ParametricQuasiPolynomial = made((*names, *values))

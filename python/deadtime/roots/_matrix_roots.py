@@ -110,9 +110,10 @@ class RoundedExpansion:
                 confirmed = False
             if not confirmed:
                 raise CountMismatchError(
-                    f"the expanded determinant, whose coefficients are rounded, has {number} poles "
-                    f"at {root:.6g}, and the matrices do not have as many within {half:.1e}: these "
-                    "poles are too close together for double precision",
+                    f"the expanded determinant has {number} poles at {root:.6g}, but within "
+                    f"{half:.1e} of this place the matrices do not have as many. Coefficients "
+                    "of the determinant are rounded, and these poles are too close together "
+                    "for double precision",
                     int(number),
                     [],
                 )

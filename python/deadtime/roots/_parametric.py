@@ -74,7 +74,7 @@ class ParametricQuasiPolynomial(NoExponential, Immutable):
 
     def __init__(self) -> None:
         raise TypeError(
-            "a ParametricQuasiPolynomial is made by algebra: Kp, T = parameters('Kp T') and then "
+            "make a ParametricQuasiPolynomial by algebra: Kp, T = parameters('Kp T'), and then "
             "for example s + Kp * delay(T)"
         )
 
@@ -85,7 +85,8 @@ class ParametricQuasiPolynomial(NoExponential, Immutable):
         for coefficient in terms.values():
             if not math.isfinite(coefficient):
                 raise ValueError(
-                    f"coefficient {coefficient}: coefficients must be finite; scale the equation"
+                    f"a coefficient is {coefficient}, but coefficients must be finite: scale "
+                    "the equation"
                 )
         self = object.__new__(ParametricQuasiPolynomial)
         self._adopt(names, {key: value for key, value in terms.items() if value != 0.0})
@@ -149,7 +150,10 @@ class ParametricQuasiPolynomial(NoExponential, Immutable):
                 size = abs(constant) + sum(map(abs, shifts))
                 if time < -_EPS * (len(shifts) + 1) * size:
                     place = ", ".join(f"{name}={value}" for name, value in values.items())
-                    raise ValueError(f"a delay is {time} s at {place}: delays must not be negative")
+                    raise ValueError(
+                        f"a delay is {time} s at {place}, but delays must not be negative: give "
+                        "other values of the parameters"
+                    )
                 time = 0.0  # negative by rounding only
             key = (tuple(pair for pair in powers if pair[0] not in values), power, (time, kept))
             found[key] = found.get(key, 0.0) + factor
@@ -159,8 +163,8 @@ class ParametricQuasiPolynomial(NoExponential, Immutable):
         unknown = [name for name in names if name not in self._names]
         if unknown:
             raise ValueError(
-                f"{', '.join(unknown)}: no such parameter, there "
-                + (f"is {', '.join(self._names)}" if self._names else "is none")
+                f"{', '.join(unknown)} is not a parameter of this expression. Its parameters are "
+                + (", ".join(self._names) or "none")
             )
 
     def _family_of(self, names: Collection[str]) -> ParametricQuasiPolynomial:
@@ -248,8 +252,8 @@ class ParametricQuasiPolynomial(NoExponential, Immutable):
         for (powers, power, delay), coefficient in self._terms.items():
             if power or delay != _NO_DELAY or sum(exponent for _, exponent in powers) > 1:
                 raise ValueError(
-                    f"delay({self!r}): a delay is a number, a parameter, or a sum of multiples of "
-                    "parameters and a number"
+                    f"delay({self!r}): give a number, a parameter, or a sum of parameters times "
+                    "numbers and a number"
                 )
             if powers:
                 slopes[powers[0][0]] = coefficient
@@ -292,8 +296,8 @@ class ParametricQuasiPolynomial(NoExponential, Immutable):
         names, terms = right
         if len(self._terms) * len(terms) > _MAX_TERMS:
             raise ValueError(
-                f"the product has more than {_MAX_TERMS} terms: keep the factors separate, "
-                "because the roots of a product are those of its factors"
+                f"the product has more than {_MAX_TERMS} terms. The roots of a product are the "
+                "roots of its factors, so keep the factors separate"
             )
         product: Terms = {}
         for a, x in self._terms.items():
@@ -309,8 +313,8 @@ class ParametricQuasiPolynomial(NoExponential, Immutable):
             return NotImplemented
         if exponent < 0:
             raise ValueError(
-                f"power {exponent}: powers must be whole and not negative; multiply the "
-                "equation by the divisor instead"
+                f"power {exponent}: give a whole number of zero or more. Instead of a negative "
+                "power, multiply the equation by the divisor"
             )
         power = self._of(self._names, {_ONE: 1.0})
         for bit in bin(int(exponent))[2:]:
@@ -359,7 +363,9 @@ class Parameter(ParametricQuasiPolynomial):
         if not isinstance(name, str):
             raise TypeError(f"name={name!r}: give a string, such as 'Kp'")
         if not name.isidentifier() or keyword.iskeyword(name):
-            raise ValueError(f"{name!r} is not a valid name: use letters, digits and underscores")
+            raise ValueError(
+                f"{name!r} cannot be the name of a parameter: use letters, digits and underscores"
+            )
         if name == "s":
             raise ValueError("'s' is the variable of every quasi-polynomial: use another name")
         self._adopt((name,), {(((name, 1),), 0, _NO_DELAY): 1.0})
@@ -408,7 +414,7 @@ def parameters(names: str) -> tuple[Parameter, ...]:
         raise ValueError(f"names={names!r}: give at least one name")
     for word in words:
         if words.count(word) > 1:
-            raise ValueError(f"{word!r} is given twice: give every parameter its own name")
+            raise ValueError(f"the name {word!r} is given twice: give every parameter its own name")
     return tuple(Parameter(word) for word in words)
 
 
@@ -430,8 +436,8 @@ def _coerced(other: object) -> tuple[tuple[str, ...], Terms] | None:
 
 def _no_quotient(divisor: object) -> str:
     return (
-        f"division by {divisor!r}: the result would not be a quasi-polynomial. Multiply the "
-        "equation by this divisor: a + b/T = 0 becomes T*a + b = 0"
+        f"dividing by {divisor!r} would not give a quasi-polynomial. Multiply the equation by "
+        "this divisor: a + b/T = 0 becomes T*a + b = 0"
     )
 
 

@@ -85,8 +85,8 @@ class QuasiPolynomial(NoExponential, Immutable, Characteristic):
         times = _real_array("delays", delays, 1)
         if len(rows) != len(times):
             raise ValueError(
-                f"{len(rows)} rows of coefficients but {len(times)} delays: "
-                "give one delay for every row"
+                f"{len(rows)} rows of coefficients and {len(times)} delays are given: give one "
+                "delay for each row"
             )
         self._adopt(native.QuasiPolynomial(rows, times))
 
@@ -201,7 +201,7 @@ class QuasiPolynomial(NoExponential, Immutable, Characteristic):
         if is_number(other):
             divisor = float(cast(float, other))
             if divisor == 0.0:
-                raise ZeroDivisionError("division of a quasi-polynomial by zero")
+                raise ZeroDivisionError("a quasi-polynomial cannot be divided by zero")
             return self._wrap(native.QuasiPolynomial(self._coefficients / divisor, self._delays))
         if isinstance(other, QuasiPolynomial):
             return _quotient(self, other)
@@ -220,7 +220,9 @@ class QuasiPolynomial(NoExponential, Immutable, Characteristic):
         except TypeError:
             return NotImplemented
         if abs(power) >= 2**31:
-            raise ValueError(f"exponent {power}: a power that high does not fit into memory")
+            raise ValueError(
+                f"power {power}: the result would not fit into memory, so give a lower power"
+            )
         if power < 0:
             return 1.0 / self._wrap(self._native.pow(-power))
         return self._wrap(self._native.pow(power))
@@ -384,7 +386,8 @@ class QuasiPolynomial(NoExponential, Immutable, Characteristic):
         found = self._native.expansion(place, highest)
         if not np.isfinite(found.errors).all():
             raise ValueError(
-                f"s={place}: a power of s or an exponential exceeds the range of double precision"
+                f"s={place}: here a power of s or an exponential exceeds the range of double "
+                "precision"
             )
         return Expansion(found.coefficients, found.errors, found.delay)
 
@@ -442,7 +445,7 @@ def delay(T: Any) -> Any:
     if hasattr(T, "_exponential"):
         return T._exponential()
     if not is_number(T):
-        raise TypeError(f"T={T!r}: a delay must be a real number of seconds")
+        raise TypeError(f"T={T!r}: give the delay as a real number of seconds")
     return QuasiPolynomial([[1.0]], [float(T)])
 
 
@@ -464,7 +467,7 @@ def is_number(value: object) -> bool:
 def _places(s: Any) -> NDArray[np.complex128]:
     points = np.asarray(unmasked("s", s))
     if points.dtype.kind not in "biufc":
-        raise TypeError(f"s of dtype {points.dtype}: give complex or real numbers")
+        raise TypeError(f"s has the dtype {points.dtype}: give complex or real numbers")
     return points.astype(np.complex128, copy=False)
 
 
@@ -479,12 +482,14 @@ def _real_array(name: str, values: ArrayLike, ndim: int) -> NDArray[np.float64]:
         array = np.asarray(values)
     except ValueError as error:
         raise ValueError(
-            f"{name} has rows of different lengths: fill them up with zeros"
+            f"the rows of {name} have different lengths: fill shorter rows up with zeros"
         ) from error
     if array.dtype.kind not in "biuf":
-        raise TypeError(f"{name} of dtype {array.dtype}: give real numbers")
+        raise TypeError(f"{name} has the dtype {array.dtype}: give real numbers")
     if array.ndim != ndim or array.size == 0:
-        raise ValueError(f"{name} of shape {array.shape}: give {ndim} dimensions, none empty")
+        raise ValueError(
+            f"{name} has shape {array.shape}: give an array of {ndim} dimensions that is not empty"
+        )
     return array.astype(np.float64, copy=False)
 
 

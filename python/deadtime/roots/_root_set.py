@@ -136,7 +136,7 @@ class RootSet(ReadOnlyArrays, Pictured):
         if len(self) > _SHOWN:
             lines.append(f"  and {len(self) - _SHOWN} more")
         if math.isfinite(self.chain_abscissa):
-            lines.append(f"  further left, chains of roots can come to re={self.chain_abscissa:g}")
+            lines.append(f"  further left, chains of roots may approach re={self.chain_abscissa:g}")
         if len(self.hidden):
             listed = ", ".join(map(_written, self.hidden[:_SHOWN]))
             more = " and more" if len(self.hidden) > _SHOWN else ""

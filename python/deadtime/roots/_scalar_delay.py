@@ -128,7 +128,9 @@ def rightmost_branches(a1: float, n: int = 2) -> NDArray[np.int64]:
     array([-1.5154, -1.5154, -6.6601, -6.6601])
     """
     if not (np.isfinite(a1) and a1 != 0):
-        raise ValueError(f"a1={a1}: without a delayed term there are no branches to choose from")
+        raise ValueError(
+            f"a1={a1}: without the delayed term, the equation has no branches to choose from"
+        )
     k = np.arange(whole_number("n", n), dtype=np.int64)
     half = (k + 1) // 2
     return np.where((k % 2 == 1) == (a1 > 0), half, -half)

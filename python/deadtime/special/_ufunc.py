@@ -76,7 +76,7 @@ def _explain(ufunc: np.ufunc, arguments: tuple[Any, ...]) -> None:
         np.broadcast_shapes(*shapes.values())
     except ValueError:
         listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
-        raise ValueError(f"shapes do not broadcast: {listed}") from None
+        raise ValueError(f"the shapes of the arguments do not broadcast: {listed}") from None
 
 
 def foreign(values: object) -> bool:
@@ -118,13 +118,19 @@ def _integers(name: str, values: ArrayLike) -> NDArray[np.int64]:
     if array.dtype.kind not in "iu":
         example = next(iter(array.ravel()[:1].tolist()), None)
         if array.dtype == object and array.size and all(type(i) is int for i in array.flat):
-            raise ValueError(f"{name}={_largest(array)} does not fit a 64-bit integer")
+            raise ValueError(
+                f"{name}={_largest(array)} is too large: give a branch number that fits a 64-bit "
+                "integer"
+            )
         raise TypeError(
-            f"{name}={example!r} (dtype {array.dtype}) is not an integer: give the number of "
-            "a branch, an integer such as 0 or -1"
+            f"{name}={example!r} (dtype {array.dtype}) is not an integer: give the number of a "
+            "branch, such as 0 or -1"
         )
     if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
-        raise ValueError(f"{name}={_largest(array)} does not fit a 64-bit integer")
+        raise ValueError(
+            f"{name}={_largest(array)} is too large: give a branch number that fits a 64-bit "
+            "integer"
+        )
     return array.astype(np.int64, copy=False)
 
 

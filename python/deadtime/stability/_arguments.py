@@ -40,8 +40,8 @@ def ranges_of(given: Given) -> dict[str, Range]:
     ends = {name: interval(name, value, may_be_point=True) for name, value in given.items()}
     if sum(low < high for low, high in ends.values()) > MOST_MOVING:
         raise ValueError(
-            f"ranges for more than {MOST_MOVING} parameters ({', '.join(given)}): give the "
-            "others a value in at={...}"
+            f"ranges of more than {MOST_MOVING} parameters ({', '.join(given)}) are given: for "
+            "the other parameters, give a value in at={...}"
         )
     return ends
 
@@ -54,7 +54,9 @@ def map_axes(
         raise TypeError(f"ranges={ranges!r}: give a dict such as {{'Kp': (0, 6), 'Kv': (-1, 1)}}")
     if len(ranges) != 2:
         raise ValueError(
-            f"ranges for {len(ranges)} parameters ({', '.join(map(str, ranges))}): a map has two"
+            f"ranges of {len(ranges)} parameters ({', '.join(map(str, ranges))}) are given, "
+            "but a map has two: give two ranges, and values of the other parameters in "
+            "at={...}"
         )
     sizes = two_sizes("shape", shape, least)
     _refuse_more(sizes, most)
@@ -81,8 +83,8 @@ def _refuse_more(sizes: Iterable[int], most: float) -> None:
     cells = math.prod(sizes)
     if cells > most:
         raise ValueError(
-            f"{cells} cells: more than {most} are more than a picture holds; take a smaller "
-            "shape, or several maps of smaller ranges"
+            f"a map of {cells} cells is too large for a picture, which has at most {most} "
+            "cells: take a smaller shape, or several maps of smaller ranges"
         )
 
 

@@ -64,8 +64,8 @@ def boundaries_of(
     found = family._family.boundaries(axes, decay=decay, damping=damping)
     if found is None:
         raise ValueError(
-            f"the family is affine in neither {' nor '.join(axes)}, and all its members have "
-            "a root at 0: cancel the factor s to see the crossings of the other roots"
+            "all members of the family have a root at 0, and the family is not affine in "
+            f"{' nor '.join(axes)}. Cancel the factor s to see the crossings of the other roots"
         )
     return boundaries_along(found, axes)
 

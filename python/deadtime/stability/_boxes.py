@@ -112,13 +112,16 @@ class ProvedBoxes(ReadOnlyArrays, Pictured):
             array = real_array("points", points)
             if array.ndim == 0 or array.shape[-1] != len(self.names):
                 raise ValueError(
-                    f"points of shape {array.shape}: the last axis holds {', '.join(self.names)}"
+                    f"points has shape {array.shape}: give an array whose last axis contains "
+                    f"{', '.join(self.names)}"
                 )
         else:
             wrong = [name for name in values if name not in self.names]
             wrong += [name for name in self.names if name not in values]
             if wrong:
-                raise ValueError(f"{wrong[0]}: give exactly {', '.join(self.names)}")
+                raise ValueError(
+                    f"{wrong[0]} is missing or unknown: give exactly {', '.join(self.names)}"
+                )
             columns = [real_array(name, values[name]) for name in self.names]
             array = np.stack(np.broadcast_arrays(*columns), axis=-1)
         flat = array.reshape(-1, len(self.names))
@@ -239,7 +242,7 @@ def proved_boxes(
     ends = ranges_of(ranges)
     share = finite("tol", tol)
     if not 0.0 <= share <= 1.0:
-        raise ValueError(f"tol={share}: give a share of the ranges, from 0 to 1")
+        raise ValueError(f"tol={share}: give a share of the ranges, between 0 and 1")
     with reported(progress) as report:
         found = native.proved_boxes(
             family_of(family, tuple(ends), at)._family,
@@ -337,12 +340,16 @@ def _point(given: Mapping[str, SupportsFloat], ranges: Mapping[str, Range]) -> d
         raise TypeError(f"around={given!r}: give a dict such as {{'Kp': 2.0}}")
     unknown = [name for name in given if name not in ranges]
     if unknown:
-        raise ValueError(f"around: {unknown[0]} has no range, but {', '.join(ranges)}")
+        raise ValueError(
+            f"around: {unknown[0]} has no range. Ranges are given for {', '.join(ranges)}"
+        )
     point = {}
     for name, (low, high) in ranges.items():
         if name not in given and low < high:
             raise ValueError(f"around has no {name}: give {', '.join(ranges)}")
         point[name] = finite(name, given.get(name, low))
         if not low <= point[name] <= high:
-            raise ValueError(f"around: {name}={point[name]} lies outside {low} to {high}")
+            raise ValueError(
+                f"around: {name}={point[name]} is outside of its range, {low} to {high}"
+            )
     return point

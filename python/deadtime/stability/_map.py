@@ -111,7 +111,8 @@ class StabilityMap(ReadOnlyArrays, Pictured):
             return boundaries_along(held.boundaries(self.decay, self.damping), self.axes)
         if self.family is None:
             raise ValueError(
-                "the map was made without the family that it judges, so it has no boundaries"
+                "this map was made without the family of equations, so its boundaries "
+                "cannot be found"
             )
         return boundaries_of(self.family, self.axes, self.decay, self.damping)
 
@@ -192,8 +193,8 @@ class StabilityMap(ReadOnlyArrays, Pictured):
         if not np.isfinite(candidates).any():
             if self.stable.any():
                 raise ValueError(
-                    "the map has no abscissa, by which the best cell is chosen: compute it "
-                    "with abscissa=True"
+                    "the map contains no abscissa, which is needed to choose the best cell: "
+                    "compute it with abscissa=True"
                 )
             raise ValueError(
                 f"no cell of the map is stable: try other ranges of {' and '.join(self.names)}"
@@ -232,7 +233,7 @@ class StabilityMap(ReadOnlyArrays, Pictured):
             raise ValueError(f"show={show!r}: give 'abscissa' or 'counts'")
         computed = bool(np.isfinite(self.abscissa).any())
         if show == "abscissa" and not computed:
-            raise ValueError("the map has no abscissa to show: compute it with abscissa=True")
+            raise ValueError("the map contains no abscissa to show: compute it with abscissa=True")
         ax = shown_axes(ax)
         plot_stability_map(ax, self, chosen, show or ("abscissa" if computed else "counts"))
         return ax
@@ -259,7 +260,8 @@ class StabilityMap(ReadOnlyArrays, Pictured):
         """
         if self._loop is None:
             raise ValueError(
-                "the explorer shows maps of a ControlLoop, but this map is of another family"
+                "the explorer shows only maps of a ControlLoop, but this map was made from "
+                "another family"
             )
         ends = {name: (float(axis[0]), float(axis[-1])) for name, axis in self.axes.items()}
         return self._loop.explore(ends)

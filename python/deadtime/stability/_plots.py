@@ -145,8 +145,8 @@ def plot_boxes(ax: Axes, boxes: ProvedBoxes) -> Axes:
     moving = [i for i, name in enumerate(boxes.names) if np.diff(boxes.ranges[name])[0] > 0.0]
     if len(moving) != 2:
         raise ValueError(
-            f"the boxes have {len(moving)} parameters, but a picture shows two: give the "
-            "others values"
+            f"the boxes have {len(moving)} parameters, but a picture shows two: give each other "
+            "parameter a value"
         )
     across, up = moving
     left, right = boxes.low[:, across], boxes.high[:, across]

@@ -95,16 +95,21 @@ def stability_radius(
             raise TypeError(f"scales={scales!r}: give a dict such as {{'Kp': 1.0}}")
         unknown = [name for name in scales if name not in values]
         if unknown:
-            raise ValueError(f"scale of {unknown[0]}: the point has {', '.join(names)}")
+            raise ValueError(
+                f"scales contains {unknown[0]}, which is not a parameter of the point. Its "
+                f"parameters are {', '.join(names)}"
+            )
         units |= {name: positive(f"scale of {name}", scales[name]) for name in scales}
     for name, unit in units.items():
         if unit == 0.0 and name not in (scales or ()):
             raise ValueError(
-                f"{name}=0 gives no scale for this parameter: give scales={{{name!r}: ...}}"
+                f"{name} is 0 at this point, so its size gives no scale: give "
+                f"scales={{{name!r}: ...}}"
             )
     if len(names) > MOST_MOVING:
         raise ValueError(
-            f"more than {MOST_MOVING} parameters vary: give the others a value in at={{...}}"
+            f"more than {MOST_MOVING} parameters vary: for the other parameters, give a "
+            "value in at={...}"
         )
     known = family_of(family, names, at)
     found = native.stability_radius(

@@ -91,7 +91,8 @@ class Tiles(ReadOnlyArrays):
             place = operator.index(number)
             if not 0 <= place < len(sizes):
                 raise IndexError(
-                    f"tile {tuple(block)}: there are {self.shape[0]} by {self.shape[1]}"
+                    f"tile {tuple(block)} does not exist: the map has {self.shape[0]} by "
+                    f"{self.shape[1]} tiles"
                 )
             start = sum(sizes[:place])
             slices.append(slice(start, start + sizes[place]))

@@ -55,10 +55,14 @@ class DelayMatrices(Immutable):
         q = len(next(iter(outputs.values()))) if outputs else 0
         derivative = _matrix("E", np.eye(n) if E is None else E)
         if N is not None and not isinstance(N, Mapping):
-            raise TypeError("N: give a dict of matrices by their delays, which are above zero")
+            raise TypeError(
+                "N: give a dict of matrices, whose keys are their delays in s, all above zero"
+            )
         late = {} if N is None else _by_delay("N", N)
         if any(tau == 0.0 for tau in late):
-            raise ValueError("N has a matrix with delay 0, but this matrix is E: give E")
+            raise ValueError(
+                "N has a matrix with delay 0, but the matrix of x'(t) is E: give this matrix as E"
+            )
         for name, group, shape in (
             ("A", state, (n, n)),
             ("B", inputs, (n, p)),
@@ -70,9 +74,9 @@ class DelayMatrices(Immutable):
             for tau, matrix in group.items():
                 if matrix.shape != shape:
                     raise ValueError(
-                        f"{name} with delay {tau:g} s has shape {matrix.shape}, not {shape}: A "
-                        f"has {n} rows, which is the number of states, and there are {p} inputs "
-                        f"and {q} outputs"
+                        f"{name} with delay {tau:g} s has shape {matrix.shape}, but it must "
+                        f"have shape {shape}: A has {n} rows, one for each state, and there are "
+                        f"{p} inputs and {q} outputs"
                     )
         # Of one state, any single input has a B like this.
         if 1 < n == p and C is None and D is None and not isinstance(B, Mapping):
@@ -226,9 +230,9 @@ def _refuse_delayed_state(n: int, has_delay: bool) -> None:
     """Raise for a square B of a system without any delay: most people mean a delayed state."""
     if not has_delay:
         raise ValueError(
-            f"A and B are both of shape {(n, n)} and have no delay: for a state that also acts "
-            "tau seconds late, give DelaySystem({0: A0, tau: A1}); for as many inputs as states, "
-            "give B={0: B}"
+            f"A and B both have shape {(n, n)} and no delay, so their meaning is not clear. If "
+            "the state also acts tau seconds late, give DelaySystem({0: A0, tau: A1}). If "
+            "there are as many inputs as states, give B={0: B}"
         )
 
 
@@ -247,9 +251,9 @@ def _matrix(name: str, given: ArrayLike) -> Array:
     if matrix.ndim == 0:
         matrix = matrix.reshape(1, 1)
     if matrix.ndim != 2:
-        raise ValueError(f"{name} has shape {matrix.shape}: give a matrix, one row for each row")
+        raise ValueError(f"{name} has shape {matrix.shape}: give a matrix, as a list of rows")
     if not np.isfinite(matrix).all():
-        raise ValueError(f"{name} holds {matrix[~np.isfinite(matrix)][0]}: give finite numbers")
+        raise ValueError(f"{name} contains {matrix[~np.isfinite(matrix)][0]}: give finite numbers")
     matrix = matrix.copy()
     matrix.flags.writeable = False
     return matrix

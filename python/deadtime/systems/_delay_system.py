@@ -270,8 +270,8 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
         ):
             if chosen is None and count > 1:
                 raise ValueError(
-                    f"the system has {count} {name}s: choose one by {name}=. The norm from "
-                    "all inputs to all outputs is not computed"
+                    f"the system has {count} {name}s: choose one of them by {name}=. The norm "
+                    "from all inputs to all outputs is not computed"
                 )
         return self.transfer_function(output or 0, input or 0).hinf_norm()
 
@@ -393,8 +393,8 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
     def _differentiated(self) -> Realisable:
         if any(matrix.any() for matrix in self._D.values()):
             raise ValueError(
-                "D is not zero, so the response to an impulse contains an impulse itself: "
-                "leave D out, and add its part separately"
+                "D is not zero, so the impulse response contains an impulse: leave D out, and "
+                "add its part to the result"
             )
         return _Differentiated(self)
 
@@ -429,8 +429,8 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
         if not exact:
             raise ValueError(
                 "a certificate needs an expanded determinant without rounded coefficients, "
-                "which this system does not have. count() proves the same number, but writes "
-                "no certificate"
+                "which this system does not have. Use count(), which proves the same number of "
+                "roots without a certificate"
             )
         return h
 
@@ -442,7 +442,7 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
         i, j = operator.index(output), operator.index(input)
         for name, index, size in (("output", i, self.n_outputs), ("input", j, self.n_inputs)):
             if not 0 <= index < size:
-                raise IndexError(f"{name}={index}: the system has {size} of them, from 0")
+                raise IndexError(f"{name}={index}: the system has {size} of them, numbered from 0")
         return i, j
 
 

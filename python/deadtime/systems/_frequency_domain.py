@@ -84,7 +84,7 @@ class FrequencyDomain(ABC):
         """
         frequencies = _frequencies(omega)
         if not self._num.coefficients.any():
-            raise ValueError("the zero transfer function has no phase")
+            raise ValueError("this transfer function is zero, so it has no phase")
         size = np.abs(frequencies).ravel()
         (a, p), (b, q) = self._num._native.first_term(), self._den._native.first_term()
         start = np.pi * (int(a < 0.0) - int(b < 0.0) + 0.5 * (p - q))
@@ -260,7 +260,9 @@ class FrequencyDomain(ABC):
             given = _frequencies(omega)
             rising = given.ndim == 1 and given.size > 1 and bool(np.all(np.diff(given) > 0.0))
             if not rising or given[0] <= 0.0:
-                raise ValueError("omega: give at least two increasing frequencies above zero")
+                raise ValueError(
+                    "omega: give two or more frequencies in rad/s, all above zero and increasing"
+                )
             return given
         corners: list[float] = []
         for h in (self._num, self._den):

@@ -32,7 +32,8 @@ def control_package() -> Any:
         return importlib.import_module("control")
     except ImportError as error:
         raise ImportError(
-            "this needs python-control, which is not installed: pip install control"
+            "this function needs python-control, which is not installed. This command "
+            "installs it: pip install control"
         ) from error
 
 
@@ -51,14 +52,15 @@ def _of_control(system: Any) -> tuple[Array, Array]:
     control = control_package()
     if not isinstance(system, (control.TransferFunction, control.StateSpace)):
         raise TypeError(
-            f"{type(system).__name__}: give a TransferFunction or StateSpace of python-control"
+            f"system is of type {type(system).__name__}: give a TransferFunction or StateSpace of "
+            "python-control"
         )
     if system.dt not in (None, 0):
         raise _is_sampled(system)
     if (system.ninputs, system.noutputs) != (1, 1):
         raise ValueError(
-            f"the system has {system.ninputs} inputs and {system.noutputs} outputs: choose "
-            "one of each first, for example system[0, 0]"
+            f"the system has {system.ninputs} inputs and {system.noutputs} outputs: choose one "
+            "input and one output, for example by system[0, 0]"
         )
     if isinstance(system, control.StateSpace):
         return _of_state_space(system.A, system.B, system.C, system.D)
@@ -72,24 +74,24 @@ def _of_scipy(system: Any) -> tuple[Array, Array]:
     if isinstance(system, signal.dlti):
         raise _is_sampled(system)
     if not isinstance(system, signal.lti):
-        raise TypeError(f"the system has {type(system).__name__} outputs: choose one first")
+        raise TypeError(f"the system has {type(system).__name__} outputs: choose one output first")
     if isinstance(system, signal.StateSpace):
         if system.D.shape != (1, 1):
             raise ValueError(
-                f"the system has {system.D.shape[1]} inputs and {system.D.shape[0]} outputs: pick "
-                "one of each first"
+                f"the system has {system.D.shape[1]} inputs and {system.D.shape[0]} outputs: "
+                "choose one input and one output first"
             )
         return _of_state_space(system.A, system.B, system.C, system.D)
     transfer = system.to_tf()
     if np.ndim(transfer.num) > 1 and len(transfer.num) > 1:
-        raise ValueError(f"the system has {len(transfer.num)} outputs: pick one first")
+        raise ValueError(f"the system has {len(transfer.num)} outputs: choose one output first")
     return _numbers(np.ravel(transfer.num)), _numbers(transfer.den)
 
 
 def _is_sampled(system: Any) -> ValueError:
     return ValueError(
-        f"the system has the time step dt={system.dt}, but only continuous systems are read: "
-        "for a sampled loop, use ControlLoop with sample_time"
+        f"the system has the time step dt={system.dt}, but only continuous systems can be "
+        "converted. For a sampled loop, use ControlLoop with sample_time"
     )
 
 
@@ -110,7 +112,7 @@ def _of_state_space(A: Any, B: Any, C: Any, D: Any) -> tuple[Array, Array]:
 def _numbers(coefficients: Any) -> Array:
     array = np.asarray(coefficients)
     if np.iscomplexobj(array):
-        raise TypeError("the coefficients are complex: give real ones")
+        raise TypeError("the coefficients are complex: give real coefficients")
     return array.astype(np.float64)
 
 
@@ -121,9 +123,9 @@ def rational(num: QuasiPolynomial, den: QuasiPolynomial, order: int | None) -> t
         return num.coefficients[0, ::-1].copy(), den.coefficients[0, ::-1].copy()
     if order is None:
         raise ValueError(
-            f"the system has a delay of {delays[-1]:g} s, and a rational transfer function has "
-            "none: pade=n replaces delays by Padé approximants of order n, wrong in phase from "
-            f"about {2.0 / delays[-1]:.3g} n rad/s on"
+            f"the system has a delay of {delays[-1]:g} s, which no rational transfer function "
+            "has exactly. Give pade=n for Padé approximants of order n, whose phase is wrong "
+            f"from about {2.0 / delays[-1]:.3g} n rad/s on"
         )
     n = whole_number(
         "pade", order, limit=_HIGHEST_ORDER + 1, otherwise=", as polynomials in double precision"

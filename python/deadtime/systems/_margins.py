@@ -103,7 +103,8 @@ class Margins(ReadOnlyArrays):
         """The delay margin of a loop that must be stable."""
         if not self.stable:
             raise ValueError(
-                "the loop is not stable without further delay, so it has no delay margin"
+                "the closed loop is not stable even without further delay, so it has no "
+                "delay margin"
             )
         return self.delay_margin
 

@@ -24,7 +24,7 @@ def quasi_polynomial(name: str, given: Polynomial) -> QuasiPolynomial:
     descending = real_array(name, cast(ArrayLike, given))
     if descending.ndim != 1 or descending.size == 0:
         raise ValueError(
-            f"{name} of shape {descending.shape}: give a QuasiPolynomial, a number, or the "
+            f"{name} has shape {descending.shape}: give a QuasiPolynomial, a number, or the "
             "coefficients in descending powers of s"
         )
     return QuasiPolynomial(descending[None, ::-1], [0.0])

@@ -145,13 +145,13 @@ def _singular(rank: int, size: int, is_neutral: bool) -> str:
     missing = size - rank
     equations = "an algebraic equation" if missing == 1 else f"{missing} algebraic equations"
     text = (
-        f"E has rank {rank} of {size}: the system contains {equations} besides differential "
-        "ones, and such a system is not simulated"
+        f"E has rank {rank} but {size} rows, so the system contains {equations} besides "
+        "differential equations. Such a system cannot be simulated"
     )
     if is_neutral:
         text += (
-            "; with N, derivatives of the past would determine the state itself (an advanced "
-            "equation), and every jump would return less smooth than before"
+            ". With N, derivatives of the past would determine the state itself (an advanced "
+            "equation), so every jump would return steeper than before"
         )
     return text + ". Eliminate the states that have no derivative"
 
@@ -164,8 +164,8 @@ def of_ratio(num: QuasiPolynomial, den: QuasiPolynomial) -> Realisation:
     leading = float(den.coefficients[0, n]) if n < den.coefficients.shape[1] else 0.0
     if n == 0 and len(den.delays) > 1:
         raise ValueError(
-            f"1/({den!r}) is a difference equation without any derivative, and such an "
-            "equation is not simulated"
+            f"1/({den!r}) is a difference equation without a derivative, and such an equation "
+            "cannot be simulated"
         )
 
     def rows(h: QuasiPolynomial, power: slice, scale: float) -> dict[float, NDArray[np.float64]]:

@@ -195,14 +195,17 @@ class Response(ReadOnlyArrays, Pictured):
         settling = positive("settling", settling)
         rise = (finite("rise", rise[0]), finite("rise", rise[1]))
         if not 0.0 <= rise[0] < rise[1]:
-            raise ValueError(f"rise={rise}: give two parts of the step, the smaller one first")
+            raise ValueError(
+                f"rise={rise}: give two shares of the step, the smaller one first, such as (0.1, "
+                "0.9)"
+            )
         if steady_state is not None:
             steady_state = finite("steady_state", steady_state)
         is_given = steady_state is not None
         signals = np.atleast_2d(self.outputs)
         index = operator.index(output)
         if not 0 <= index < len(signals):
-            raise IndexError(f"output={output}: there are {len(signals)} of them, from 0")
+            raise IndexError(f"output={output}: there are {len(signals)} outputs, numbered from 0")
         if steady_state is None and self.steady_state is not None:
             steady_state = float(np.ravel(self.steady_state)[index])
         dense = self._dense

@@ -81,8 +81,8 @@ def respond(system: Realisable, time: ArrayLike, drive: Drive) -> Response:
     has_past = callable(history) or np.any(history) or drive.initial_state is not None
     if not model.has_states and has_past:
         raise TypeError(
-            "a transfer function does not describe the state: give a DelaySystem to start "
-            "from a history other than zero"
+            "a transfer function has no state, so it cannot start from a history. Give a "
+            "DelaySystem for a history other than zero"
         )
     times = increasing("time", time)
     if times.size == 0:
@@ -97,8 +97,9 @@ def respond(system: Realisable, time: ArrayLike, drive: Drive) -> Response:
     if not model.has_states and before.any():
         if model.rest is None:
             raise ValueError(
-                f"input_before={before[0]}: {system!r} has a pole at zero, so it is at rest "
-                "only under an input of zero; give a DelaySystem with its history"
+                f"input_before={before[0]}: {system!r} has a pole at zero, so it can rest only "
+                "under an input of zero. To start otherwise, give a DelaySystem with its "
+                "history"
             )
         state = model.rest * before
         past = signals.constant(state)
@@ -128,10 +129,10 @@ def _refuse_hidden_growth(duration: float, rate: float) -> None:
     """Refuse a run in which a hidden mode amplifies rounding until it shows."""
     if rate * duration > math.log(_ROUNDING / np.finfo(float).eps):
         raise ValueError(
-            f"numerator and denominator have a mode in common that grows with exp({rate:.6g} t) "
-            "(see hidden_modes()). It does not show in the output, but amplifies rounding, which "
-            f"hides the output before the end of this run of {duration:.6g} s: end it earlier, or "
-            "divide the common factor out"
+            f"numerator and denominator have a common mode that grows with exp({rate:.6g} t), "
+            "see hidden_modes(). The mode amplifies rounding errors, which hide the output "
+            f"before the end of this run of {duration:.6g} s. Divide the common factor out, or "
+            "end the run earlier"
         )
 
 
@@ -145,7 +146,7 @@ def step_response(
     model = _realisation(system)
     index = operator.index(input)
     if not 0 <= index < model.inputs:
-        raise IndexError(f"input={index}: the system has {model.inputs} of them, from 0")
+        raise IndexError(f"input={index}: the system has {model.inputs} inputs, numbered from 0")
     height = np.zeros(model.inputs)
     height[index] = finite("amplitude", amplitude)
     if time is not None:
@@ -186,7 +187,9 @@ def _input(
         raise ValueError(f"interpolation={interpolation!r}: give 'hold' or 'linear'")
     if callable(inputs):
         if input_time is not None:
-            raise ValueError("inputs is a callable, so input_time has no use: leave input_time out")
+            raise ValueError(
+                "inputs is a function, which needs no input_time: leave input_time out"
+            )
         span = (start, float(times[-1]))
         if span[0] == span[1]:
             value = signals.sampled("input u(t)", inputs, times, p, smooth["vectorized"])[:, 0]
@@ -204,8 +207,9 @@ def _input(
     if rows.shape != (p, where.size) or where.size == 0:
         expected = f"({where.size},)" if p == 1 else f"({p}, {where.size})"
         raise ValueError(
-            f"inputs has shape {values.shape}, not {expected}: give one value for each input at "
-            "each of the times in input_time (or in time, without input_time)"
+            f"inputs has shape {values.shape}, but it must have shape {expected}: give one "
+            "value of each input for each time in input_time, or in time if input_time is left "
+            "out"
         )
     if not np.isfinite(rows).all():
         at = int(np.argmin(np.isfinite(rows).all(axis=0)))
@@ -226,7 +230,8 @@ def _past(
     if not callable(history):
         if derivative is not None:
             raise ValueError(
-                "history_derivative needs a callable history: leave history_derivative out"
+                "history_derivative is the derivative of a history that is a function, but "
+                "history is none: leave history_derivative out"
             )
         state = _vector("history", history, model.states, "states")
         return signals.constant(state), None, state
@@ -253,9 +258,9 @@ def _vector(name: str, given: ArrayLike, width: int, what: str = "inputs") -> Ar
         values = np.full(width, float(values))
     if values.shape != (width,):
         raise ValueError(
-            f"{name} has shape {values.shape}, not ({width},): give one number for each of the "
-            f"{width} {what}"
+            f"{name} has shape {values.shape}, but it must have shape ({width},): give one "
+            f"number for each of the {width} {what}"
         )
     if not np.isfinite(values).all():
-        raise ValueError(f"{name} holds {values[~np.isfinite(values)][0]}: give finite numbers")
+        raise ValueError(f"{name} contains {values[~np.isfinite(values)][0]}: give finite numbers")
     return values

@@ -27,6 +27,6 @@ def smallest_delay(delays: Iterable[float]) -> float:
     late = [tau for tau in delays if tau > 0.0]
     if not late:
         raise ValueError(
-            "this system has no delay in its states, so its roots do not depend on a delay"
+            "the states of this system have no delay, so its roots do not depend on a delay"
         )
     return min(late)

@@ -101,7 +101,9 @@ def sampled(
     if values.shape != (width, len(times)):
         expected = f"({width}, {len(times)})" if vectorized else f"({width},) at each time"
         shape = values.shape if vectorized else values.shape[:1]
-        raise ValueError(f"{name} gives values of shape {shape}, not {expected}")
+        raise ValueError(
+            f"{name} returned an array of shape {shape}: return an array of shape {expected}"
+        )
     is_finite = np.isfinite(values).all(axis=0)
     if not is_finite.all():
         at = int(np.argmin(is_finite))

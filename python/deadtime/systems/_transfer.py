@@ -96,7 +96,7 @@ class TransferFunction(NoExponential, Immutable, FrequencyDomain, HasPoles, HasR
             den = below if den == 1.0 else den * below
         n, d = quasi_polynomial("num", num), quasi_polynomial("den", den)
         if not d.coefficients.any():
-            raise ZeroDivisionError("den is zero: give a denominator other than zero")
+            raise ZeroDivisionError("den is zero: give a denominator that is not zero")
         dead = non_negative("delay", delay)
         if dead:
             n = n * QuasiPolynomial([[1.0]], [dead])
@@ -212,7 +212,7 @@ class TransferFunction(NoExponential, Immutable, FrequencyDomain, HasPoles, HasR
         """
         points = np.asarray(unmasked("s", s))
         if points.dtype.kind not in "biufc":
-            raise TypeError(f"s of dtype {points.dtype}: give complex or real numbers")
+            raise TypeError(f"s has the dtype {points.dtype}: give complex or real numbers")
         flat = points.astype(np.complex128).ravel()
         values = ratio(self._num._native, self._den._native, flat)
         return values.reshape(points.shape) if points.ndim else complex(values[0])
@@ -323,8 +323,8 @@ class TransferFunction(NoExponential, Immutable, FrequencyDomain, HasPoles, HasR
         unknown = [name for name in names if name not in ("gain", "delay")]
         if unknown:
             raise ValueError(
-                f"{unknown[0]}: a loop gain has the numbers 'gain', a factor on it, and 'delay', a "
-                "further delay"
+                f"{unknown[0]} is not a parameter of a loop gain. Its parameters are 'gain', a "
+                "factor, and 'delay', a further delay"
             )
         gain: Any = Parameter("gain") if "gain" in names else 1.0
         late: Any = delay(Parameter("delay")) if "delay" in names else 1.0
@@ -337,21 +337,23 @@ class TransferFunction(NoExponential, Immutable, FrequencyDomain, HasPoles, HasR
         num, den = self.num, self.den
         if not self.is_proper:
             raise ValueError(
-                f"the numerator has degree {num.degree}, the denominator {den.degree}: an "
-                "improper transfer function differentiates its input and has no response to a step"
+                f"the numerator has degree {num.degree}, and the denominator only {den.degree}. "
+                "Such an improper transfer function differentiates its input, so it has no "
+                "step response"
             )
         if not self.is_causal:
             raise ValueError(
-                f"{self!r} is not causal: its output would depend on later inputs (or its equation "
-                "is advanced)"
+                f"{self!r} is not causal, because its output would depend on later inputs (or "
+                "its equation is advanced)"
             )
         return of_ratio(*without_common_factor(num, den))
 
     def _differentiated(self) -> Realisable:
         if self._num.degree >= self._den.degree and self._num.coefficients.any():
             raise ValueError(
-                f"the numerator has degree {self._num.degree}, the denominator "
-                f"{self._den.degree}: the response to an impulse holds an impulse itself"
+                f"the numerator has degree {self._num.degree} and the denominator "
+                f"{self._den.degree}, so the impulse response contains an impulse. Subtract the "
+                "direct feedthrough first"
             )
         return self * s
 
@@ -426,7 +428,9 @@ def feedback(G: Any, H: Any = 1.0, sign: int = -1) -> TransferFunction:
     p, q = cast(TransferFunction, back)._num, cast(TransferFunction, back)._den
     closed = d * q - float(sign) * (n * p)
     if not closed.coefficients.any():
-        raise ValueError("the loop has no solution: sign times G times H is 1 for every s")
+        raise ValueError(
+            "1 minus sign times G times H is zero for every s, so the loop has no solution"
+        )
     return TransferFunction(n * q, closed)
 
 
@@ -442,7 +446,9 @@ def _operand(value: object) -> TransferFunction | None:
 
 def _inverse(G: TransferFunction) -> TransferFunction:
     if not G._num.coefficients.any():
-        raise ZeroDivisionError("division by the zero transfer function")
+        raise ZeroDivisionError(
+            "a transfer function cannot be divided by the zero transfer function"
+        )
     return TransferFunction(G._den, G._num)
 
 

@@ -36,8 +36,8 @@ class Demands:
         """Check the arguments of `design`."""
         if max_sensitivity is not None and not finite("max_sensitivity", max_sensitivity) > 1.0:
             raise ValueError(
-                f"max_sensitivity={max_sensitivity}: Ms is above 1 in every loop with a delay; "
-                "give a number such as 1.6"
+                f"max_sensitivity={max_sensitivity}: in every loop with a delay Ms is above 1. "
+                "Give a number such as 1.6"
             )
         given = {
             "noise_gain": noise_gain,
@@ -74,8 +74,9 @@ def white_to(loop: ControlLoop, bandwidth: float | None = None) -> float:
         half = math.pi / loop.sample_time
         if bandwidth is not None and bandwidth > half:
             raise ValueError(
-                f"bandwidth={bandwidth}: noise beyond {half:.4g} rad/s, half the sampling rate, is "
-                "aliased to lower frequencies; give the noise as it is in the samples"
+                f"bandwidth={bandwidth}: noise above {half:.4g} rad/s, half the sampling rate, "
+                "appears at lower frequencies in the samples. Give the noise as it is in the "
+                "samples"
             )
         return half if bandwidth is None else bandwidth
     if bandwidth is not None:

@@ -176,7 +176,7 @@ def design(
     >>> best.margins.gain_margin >= 4.0, best.proved
     (True, ('stable', 'gain_margin'))
     >>> print(best.traded[0].words)
-    gain margin of at least 4 holds the design back: without it ...
+    gain margin of at least 4 limits the design: without it ...
     """
     template = controller_template(controller)
     if isinstance(filter, DerivativeFilter):
@@ -190,8 +190,9 @@ def design(
         doubt = refusal(loop)
         if doubt is not None and not allow_indication:
             raise ValueError(
-                f"the estimate is only an indication ({doubt}), so the margins of a design on "
-                "it are not known. Give allow_indication=True for gains without known margins"
+                f"the estimate is only an indication ({doubt}), so the margins of a design "
+                "based on this estimate are not known. For gains without known margins, give "
+                "allow_indication=True"
             )
         loop, *around = possible_loops(loop, template, level)
         plants = (*plants, *around)
@@ -201,8 +202,9 @@ def design(
     if objective in RESPONSES:
         if filter == "auto":
             raise ValueError(
-                f"filter='auto' and objective={objective!r}: give a DerivativeFilter, or choose "
-                "its corner by 'abscissa', 'damping' or 'settling_time'"
+                f"objective={objective!r} cannot choose the corner of a filter: give a "
+                "DerivativeFilter instead of filter='auto', or the objective 'abscissa', "
+                "'damping' or 'settling_time'"
             )
         weight = _load_weight(objective, load_weight)
         slack = _load_slack(objective, weight, load_slack, demands, template)
@@ -244,7 +246,7 @@ def _load_slack(
     if not counts or not isinstance(template, (PI, PID)):
         raise ValueError(
             f"load_slack={given} applies only to objective='load' with PI or PID control and "
-            "without load_weight; leave load_slack out"
+            "without load_weight. Leave load_slack out"
         )
     return non_negative("load_slack", given)
 
@@ -268,6 +270,6 @@ def _refuse_responses(
     given += ["plants"] * bool(plants)
     if given:
         raise ValueError(
-            f"{', '.join(given)} with objective={objective!r}: give one of "
-            f"{', '.join(map(repr, RESPONSES))}"
+            f"{', '.join(given)} cannot be used with objective={objective!r}: give one of the "
+            f"objectives {', '.join(map(repr, RESPONSES))}"
         )

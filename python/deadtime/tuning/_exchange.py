@@ -121,9 +121,9 @@ class Search:
         problem = self.problem
         if found.cost >= NEVER:
             raise ValueError(
-                f"a step of {problem.amplitude:g} does not settle with any gains that were "
-                "tried. The limit of the command may not let the output stay at this level. "
-                "Give a smaller amplitude, or another objective"
+                f"with all gains that were tried, a step of {problem.amplitude:g} does not "
+                "settle. Perhaps the limit of the command does not allow this output. Give a "
+                "smaller amplitude, or another objective"
             )
         worst = self._scenario(found.worst)
         return Found(np.array(found.gains), found.scenarios, found.value, worst, found.checked)
@@ -152,9 +152,9 @@ class Search:
             if step is None:
                 told = ", ".join(f"{name} = {number:.6g}" for name, number in one.items())
                 raise ValueError(
-                    f"a step of {problem.amplitude:g} settles in simulation with "
-                    f"{problem.named(found.gains)}, but for {told} it is not proved to stay in the "
-                    "band: ask for margins, or for another objective"
+                    f"with {problem.named(found.gains)}, a step of {problem.amplitude:g} "
+                    f"settles in simulation. But for {told}, no proof was found that the output "
+                    "stays in the band. Require margins, or give another objective"
                 )
             worst = max(worst, step[SIMULATED.index(self.objective)])
         return worst
@@ -176,13 +176,13 @@ def _unmet(
     nearest = ", ".join(map(_with_unit, MARGINS, together))
     at = ", ".join(f"{n} = {v:.4g}" for n, v in search.problem.named(gains).items())
     return ValueError(
-        f"no gains in the ranges have {wanted}. Each demand alone can reach at most {most}. "
-        f"Together the nearest is {nearest} at {at}. Ask for less, or widen the ranges"
+        f"no gains in the ranges have {wanted}. Each requirement alone can reach at most "
+        f"{most}. Together, the nearest is {nearest} at {at}. Require less, or give wider ranges"
     )
 
 
 def _with_unit(name: str, value: float) -> str:
-    number = "without end" if math.isinf(value) else f"{value:.4g}"
+    number = "infinite" if math.isinf(value) else f"{value:.4g}"
     return f"{name.replace('_', ' ')} {number}{UNITS[name]}"
 
 

@@ -159,12 +159,14 @@ def filter_choice(
     """Design with every corner, and choose."""
     if objective == "overshoot":
         raise ValueError(
-            "objective='overshoot': with any filter the overshoot can be zero, so it does not "
-            "choose one; choose by 'abscissa', 'damping' or 'settling_time'"
+            "objective='overshoot': every filter allows an overshoot of zero, so this "
+            "objective cannot choose a filter. Choose by 'abscissa', 'damping' or "
+            "'settling_time'"
         )
     if noise is None and command_noise is not None:
         raise ValueError(
-            "command_noise is given without noise: give the standard deviation of both"
+            "command_noise is given without noise: give the standard deviation of both, of "
+            "the command and of the measurement"
         )
     problem = problem.filtered(None)
     if shape is None:
@@ -181,13 +183,13 @@ def filter_choice(
         gains = tried[0].gains
     if noise is not None and command_noise is not None:
         most = positive("command_noise", command_noise) / positive("noise", noise)
-        rule = f"the fastest with a command noise of at most {command_noise:g}"
+        rule = f"the fastest filter with a command noise of at most {command_noise:g}"
         omega = _last(task, corners, tried, 1, lambda one: one.noise_gain <= most)
         if omega is None:
             raise _too_noisy(corners, tried, most)
     else:
         loss = positive("loss", loss)
-        rule = f"the slowest that loses at most {100 * loss:g} %"
+        rule = f"the slowest filter that loses at most {100 * loss:g} %"
         worse = [lost(objective, one.value, ideal.value) for one in tried]
         omega = _last(
             task, corners, tried, -1, lambda one: lost(objective, one.value, ideal.value) <= loss
@@ -260,14 +262,18 @@ def _corners(problem: Problem, omegas: ArrayLike | None) -> Array:
     if omegas is not None:
         corners = np.array(increasing("omegas", omegas))
         if corners.size < 2 or corners[0] <= 0.0:
-            raise ValueError("omegas: give at least two increasing corners above zero")
+            raise ValueError(
+                "omegas: give two or more corner frequencies in rad/s, all above zero and "
+                "increasing"
+            )
         return corners
     numbers = problem.loop.parameters
     late = problem.intervals["delay"][1] + numbers.get("lag", 0.0)
     late += 0.5 * numbers.get("sample_time", 0.0)
     if late == 0.0:
         raise ValueError(
-            "the loop has no delay, lag or sample time from which to choose corners: give omegas="
+            "the loop has no delay, lag or sample time from which to choose corner "
+            "frequencies: give omegas="
         )
     return np.geomspace(_SLOWEST / late, _FASTEST / late, _CORNERS)
 
@@ -281,9 +287,9 @@ def _bandwidth(loop: ControlLoop, bandwidth: float | None, fastest: float) -> fl
 def _too_slow(corners: Array, lost: Sequence[float], loss: float) -> ValueError:
     """Why every corner loses more."""
     if not np.isfinite(lost).any():
-        return ValueError("no corner has gains with the required margins: require less")
+        return ValueError("no corner frequency has gains with the required margins: require less")
     return ValueError(
-        f"no corner up to {corners[-1]:.4g} rad/s loses as little as {100 * loss:g} %; the "
+        f"no corner up to {corners[-1]:.4g} rad/s loses as little as {100 * loss:g} %, and the "
         f"smallest loss is {100 * np.nanmin(lost):.3g} %. Allow a larger loss, or give faster "
         "omegas"
     )
@@ -292,9 +298,9 @@ def _too_slow(corners: Array, lost: Sequence[float], loss: float) -> ValueError:
 def _too_noisy(corners: Array, tried: Sequence[_Tried], most: float) -> ValueError:
     """Why every corner makes more noise."""
     return ValueError(
-        f"no corner from {corners[0]:.4g} rad/s has a noise gain of {most:.4g} or less; the "
-        f"smallest is {np.nanmin([one.noise_gain for one in tried]):.4g}. Allow more noise, "
-        "give slower omegas, or smaller gains"
+        f"no corner from {corners[0]:.4g} rad/s on has a noise gain of {most:.4g} or less, and "
+        f"the smallest noise gain is {np.nanmin([one.noise_gain for one in tried]):.4g}. Allow "
+        "more noise, give slower omegas, or smaller gains"
     )
 
 

@@ -157,7 +157,7 @@ def check_gains(
     >>> dtm.check_gains(loop, {"Kp": 1.4}).passed
     True
     >>> dtm.check_gains(loop, {"Kp": 3.0})
-    <Gate refused: Ms is 3.663 in the worst loop, above 2; Kp changes from 1.2 to 3, by more ...
+    <Gate refused: Ms is 3.663 in the worst loop, but at most 2 is allowed; the gain Kp ...
     """
     judge = _Judge(positive("max_sensitivity", max_sensitivity))
     every = [*judge.loops_of(of, gains, level, override), *(_with(one, gains) for one in loops)]
@@ -239,7 +239,9 @@ class _Judge:
             return [_with(of, gains)]
         if isinstance(of, PlantEstimate):
             if not isinstance(gains, Controller):
-                raise TypeError(f"gains={gains!r}: give a controller, since a plant has none")
+                raise TypeError(
+                    f"gains={gains!r}: a PlantEstimate has no controller, so give a controller here"
+                )
             self.doubt(refusal(of), override)
             return self._signed(of, possible_loops(of, gains, level), level)
         if not isinstance(of, DelayEstimate):
@@ -247,7 +249,7 @@ class _Judge:
         self.doubt(None if of.verdict == "reliable" else of.reason or of.verdict, override)
         loop = _with(of.loop, gains)
         if not of.calibrated:
-            self.reasons.append(f"the estimate has no region: {of.uncalibrated}")
+            self.reasons.append(f"the estimate has no confidence region: {of.uncalibrated}")
             return [loop]
         if not any(name in NUMBERS for name in of.free):
             return [loop]
@@ -271,8 +273,8 @@ class _Judge:
         if low * high > 0.0:
             return loops
         self.reasons.append(
-            "the sign of the plant's gain is not certain, because the gain is between "
-            f"{low:.3g} and {high:.3g}"
+            f"the sign of the plant's gain is not certain, because its interval is {low:.3g} to "
+            f"{high:.3g}"
         )
         return loops[:1]
 
@@ -284,15 +286,17 @@ class _Judge:
             try:
                 found = loop._margin(delay_margin=False)
             except ValueError as error:
-                self.reasons.append(f"the margins are not known for {_told(loop)}: {error}")
+                self.reasons.append(f"the margins are not known if {_told(loop)}: {error}")
                 return
             if not found.stable:
-                self.reasons.append(f"the loop is not stable with {_told(loop)}")
+                self.reasons.append(f"the loop is not stable if {_told(loop)}")
                 return
             worst = max(worst, found.max_sensitivity)
         self.sensitivity = worst
         if worst > self.most * (1.0 + 1e-6):
-            self.reasons.append(f"Ms is {worst:.4g} in the worst loop, above {self.most:g}")
+            self.reasons.append(
+                f"Ms is {worst:.4g} in the worst loop, but at most {self.most:g} is allowed"
+            )
 
     def hidden_modes(self, loop: ControlLoop) -> None:
         """No pole that a zero hides and that grows, or decays slowly."""
@@ -339,7 +343,7 @@ class _Judge:
             if not math.isfinite(settled):
                 self.reasons.append(
                     f"a step of {height:.3g} does not come to rest within the limit of "
-                    f"{limit_in_words(loop)} with {_told(loop)}"
+                    f"{limit_in_words(loop)} if {_told(loop)}"
                 )
                 return
 
@@ -374,7 +378,10 @@ class _Judge:
         before = flown.gains if isinstance(flown, Controller) else dict(flown)
         for name in before:
             if name not in GAINS:
-                raise ValueError(f"flown has {name!r}, which is no gain: {', '.join(GAINS)}")
+                raise ValueError(
+                    f"flown contains {name!r}, which is not a gain: give gains from "
+                    f"{', '.join(GAINS)}"
+                )
         after = _by_term(loop.controller.gains)
         for name, was in _by_term(before).items():
             now = after.get(name, 0.0)
@@ -382,9 +389,11 @@ class _Judge:
                 continue
             told = f"from {was:.4g} to {now:.4g}"
             if was * now < 0.0:
-                self.reasons.append(f"{name} changes its sign, {told}")
+                self.reasons.append(f"the gain {name} changes its sign, {told}")
             elif was != 0.0 and not 1.0 / most <= now / was <= most * (1.0 + 1e-12):
-                self.reasons.append(f"{name} changes {told}, by more than a factor of {most:g}")
+                self.reasons.append(
+                    f"the gain {name} changes {told}, which is more than a factor of {most:g}"
+                )
 
 
 def _by_term(gains: Mapping[str, float]) -> dict[str, float]:
@@ -398,7 +407,9 @@ def _with(loop: ControlLoop, gains: Controller | Mapping[str, float]) -> Control
     own = loop.controller.gains
     for name, value in gains.items():
         if name not in own:
-            raise ValueError(f"{name}={value!r} is no gain of the controller: {', '.join(own)}")
+            raise ValueError(
+                f"{name}={value!r} is not a gain of this controller. Its gains are {', '.join(own)}"
+            )
     return loop.replace(**gains)
 
 

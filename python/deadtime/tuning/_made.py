@@ -85,7 +85,7 @@ def _trades(search: Search, found: Found, margins: LeastMargins, value: float) -
             without = search.value_without(required.without(name), found.scenarios)
             active = active or lost(objective, value, without) > _NOTHING
         if active:
-            words = f"{what} holds the design back: {_price(search, value, without)}"
+            words = f"{what} limits the design: {_price(search, value, without)}"
         else:
             words = f"{what} is met anyway: {achieved:.4g}{UNITS[name]}"
         made.append(Trade(name, least, achieved, active, without, words))
@@ -102,7 +102,7 @@ def _trades(search: Search, found: Found, margins: LeastMargins, value: float) -
         if problem.region is not None:
             known = "exactly as estimated"
         words = (
-            f"uncertainty of the {names}: without it (values {known}) "
+            f"effect of the uncertainty of {names}: without it (values {known}) "
             f"{figure_in_words(objective, without)} ({_part(price)})"
         )
         made.append(Trade("interval", math.nan, math.nan, price > _NOTHING, without, words))
@@ -115,4 +115,4 @@ def _price(search: Search, value: float, without: float, what: str = "it") -> st
 
 
 def _part(lost: float) -> str:
-    return f"it costs {100.0 * lost:.2g} %" if lost > _NOTHING else "it costs nothing"
+    return f"cost {100.0 * lost:.2g} %" if lost > _NOTHING else "no cost"

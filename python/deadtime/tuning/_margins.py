@@ -41,11 +41,12 @@ class RequiredMargins(NamedTuple):
         )
         if gain_margin is not None and not required.gain_margin > 1.0:
             raise ValueError(
-                f"gain_margin={required.gain_margin}: give a factor above 1 (6 dB are a factor of "
-                "2)"
+                f"gain_margin={required.gain_margin}: give a factor above 1, such as 2 for 6 dB"
             )
         if required.phase_margin >= 180.0:
-            raise ValueError(f"phase_margin={required.phase_margin}: give degrees below 180")
+            raise ValueError(
+                f"phase_margin={required.phase_margin}: give an angle below 180 degrees"
+            )
         return required
 
     @property

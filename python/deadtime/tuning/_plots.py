@@ -106,7 +106,7 @@ def _trade(upper: Axes, lower: Axes, choice: FilterChoice) -> None:
             choice.noise_gains,
             choice.noise_gain,
             choice.ideal_noise_gain,
-            "command noise per measurement noise",
+            "noise of the command / noise of the measurement",
             COLOURS[2],
         ),
     )

@@ -77,8 +77,8 @@ class Problem(PickledByFields):
             return (self.given,)
         if not self.loop.plant.is_rational:
             raise ValueError(
-                "ranges: the search range of the gains can be found only for a plant that is "
-                "rational except for one delay in series; give ranges= for this plant"
+                "for this plant the search range of the gains is not known, because the plant "
+                "is not rational except for one delay in series: give ranges="
             )
         return candidate_ranges(self.loop, self.free)
 
@@ -167,19 +167,20 @@ def pose(
     unknown = [name for name in held if name not in template.gains]
     if unknown:
         raise ValueError(
-            f"fixed={dict(held)}: {type(template).__name__} has no gain {unknown[0]!r}, only "
-            f"{', '.join(template.gains)}"
+            f"fixed={dict(held)}: {type(template).__name__} has no gain {unknown[0]!r}. Its "
+            f"gains are {', '.join(template.gains)}"
         )
     free = tuple(name for name in template.gains if name not in held)
     if not free:
         raise ValueError(
-            f"fixed contains every gain of {type(template).__name__} ({', '.join(held)}): "
-            "leave one gain free, or ask the loop itself for its margins"
+            f"fixed contains every gain of {type(template).__name__} ({', '.join(held)}), so "
+            "nothing is left to choose. Leave one gain free, or ask the loop itself for its "
+            "margins"
         )
     if len(free) > _MOST_FREE:
         raise ValueError(
             f"{len(free)} gains are free ({', '.join(free)}), but at most {_MOST_FREE} can be "
-            "searched: fix some of them"
+            "searched: fix some of these gains"
         )
     if region is not None:
         intervals, middle = region.intervals, region.estimate
@@ -202,7 +203,7 @@ def pose(
         spans = {name: interval(f"the range of {name}", given[name]) for name in free}
     height = finite("amplitude", amplitude)
     if height == 0.0:
-        raise ValueError("amplitude=0: this is not a step; give a number other than zero")
+        raise ValueError("amplitude=0 is not a step: give a number other than zero")
     return Problem(whole, free, spans, intervals, height, threads, region)
 
 
@@ -213,8 +214,7 @@ def _refuse_too_many_samples(loop: ControlLoop) -> None:
     if loop.delay > _MOST_SAMPLES * loop.sample_time:
         raise ValueError(
             f"sample_time={loop.sample_time:g}: the delay of {loop.delay:g} s has more than "
-            f"{_MOST_SAMPLES} samples. Leave sample_time out, because so short a hold has no "
-            "effect"
+            f"{_MOST_SAMPLES} samples. So short a hold has no effect, so leave sample_time out"
         )
 
 
@@ -246,8 +246,8 @@ def with_filter(controller: Controller, filter: DerivativeFilter | None) -> Cont
     """The same gains with another filter of the derivative, or none."""
     if not isinstance(controller, (PV, PD, PID)):
         raise ValueError(
-            f"{type(controller).__name__} has no derivative to filter: use PV, PD or PID, or "
-            "leave filter out"
+            f"{type(controller).__name__} has no derivative that could be filtered: use PV, PD "
+            "or PID, or leave filter out"
         )
     return type(controller)(**controller.gains, filter=filter)
 
@@ -265,7 +265,9 @@ def _mapping(name: str, given: Any) -> dict[str, Any]:
 def _delay_interval(loop: ControlLoop, delay: float | Range | None) -> Range:
     if delay is None:
         if loop.delay is None:
-            raise ValueError("the delay of the loop is not known: give delay=, or estimate it")
+            raise ValueError(
+                "the delay of the loop is not known: give delay=, or estimate the delay"
+            )
         return loop.delay, loop.delay
     return _times(delay)
 
@@ -276,7 +278,9 @@ def _times(delay: float | Range) -> Range:
         return non_negative("delay", delay), float(delay)
     low, high = interval("delay", delay, may_be_point=True)
     if low < 0.0:
-        raise ValueError(f"delay={delay!r} is not an interval (low, high) of times >= 0")
+        raise ValueError(
+            f"delay={delay!r}: give an interval (low, high) of times, all zero or more"
+        )
     return low, high
 
 
@@ -285,5 +289,7 @@ def _gain_interval(gain: float | Range) -> Range:
         gain = (gain, gain)
     low, high = interval("gain", gain, may_be_point=True)
     if low * high <= 0.0:
-        raise ValueError(f"gain={gain!r} is not an interval (low, high) on one side of zero")
+        raise ValueError(
+            f"gain={gain!r}: give an interval (low, high) of gains, both positive or both negative"
+        )
     return low, high

@@ -76,18 +76,18 @@ def region_of(fit: DelayEstimate, level: float, allow_indication: bool) -> Confi
     from scipy import special
 
     if not fit.calibrated:
-        raise ValueError(f"the estimate has no region: {fit.uncalibrated}")
+        raise ValueError(f"the estimate has no confidence region: {fit.uncalibrated}")
     if fit.verdict != "reliable" and not allow_indication:
         raise ValueError(
-            "the estimate is an indication, so that the margins of a design on it are not known "
-            f"({fit.reason}): fit a model that is reliable, or take allow_indication=True for "
-            "gains without known margins"
+            f"the estimate is only an indication ({fit.reason}), so the margins of a design "
+            "based on this estimate are not known. Fit a model that is reliable, or give "
+            "allow_indication=True for gains without known margins"
         )
     names = [name for name in fit.free if name in NUMBERS]
     known = {name: fit.loop.parameters[name] for name in ("delay", *names)}
     if not names:
         raise ValueError(
-            f"the estimate fits {', '.join(fit.free)}, which is not a parameter of the plant"
+            f"the estimate has fitted {', '.join(fit.free)}, which is not a parameter of the plant"
         )
     sums = _sums(names)
     labels = [_label(names, row) for row in sums]
@@ -113,7 +113,7 @@ def region_of(fit: DelayEstimate, level: float, allow_indication: bool) -> Confi
     low, high = region.intervals.get("gain", (1.0, 1.0))
     if low * high <= 0.0:
         raise ValueError(
-            f"the region of the gain, {low:.3g} to {high:.3g}, contains zero, and a loop "
+            f"the gain may be zero, because its interval is {low:.3g} to {high:.3g}, and a loop "
             "without gain has no design. Record a step with less noise, or a larger step"
         )
     return region

@@ -106,7 +106,7 @@ class Wanted:
         every = [*corners, *(one for one in fine(problem) if one not in corners)]
         if not problem.loop.plant.is_rational and self.objective != "load_ie":
             raise ValueError(
-                "the response of a plant with delays inside to a load or a step is not "
+                "for a plant with delays inside, responses to a load or a step cannot be "
                 "computed: use objective='load_ie' or objective='abscissa'"
             )
         found, middle = self._found(every, len(corners))
@@ -166,8 +166,9 @@ class Wanted:
         lost = (found.value - found.least) / abs(found.least)
         if lost > _NOTHING:
             words = (
-                f"a step that settles earlier: without it "
-                f"{figure_in_words(self.objective, found.least)} (it costs {100.0 * lost:.2g} %)"
+                "a step that settles earlier: without this demand "
+                f"{figure_in_words(self.objective, found.least)} (the demand costs "
+                f"{100.0 * lost:.2g} %)"
             )
             made.append(Trade("load_slack", self.slack, lost, True, found.least, words))
         for name, asked in self.demands.named.items():
@@ -181,20 +182,20 @@ class Wanted:
             if name != "max_sensitivity":
                 without = self.gains(every, corners, self.demands.without(name)).value
             lost = (found.value - without) / abs(without)
-            words = f"{what} holds the design back"
+            words = f"{what} limits the design"
             if name != "max_sensitivity":
                 if lost <= _NOTHING:
                     made.append(Trade(name, asked, had, False, without, f"{what} is met anyway"))
                     continue
                 words += f": without it {figure_in_words(self.objective, without)}"
-                words += f" (it costs {100.0 * lost:.2g} %)"
+                words += f" (cost {100.0 * lost:.2g} %)"
             made.append(Trade(name, asked, had, True, without, words))
         if len(every) > 1:
             without = self.gains(every[:1], 1).value
             lost = (found.least - without) / abs(without)
             words = (
-                "uncertainty of the plant: without it (values in the middle of their intervals) "
-                f"{figure_in_words(self.objective, without)}"
+                "effect of the uncertainty of the plant: without it (values in the middle of "
+                f"their intervals) {figure_in_words(self.objective, without)}"
             )
             made.append(Trade("interval", math.nan, math.nan, lost > _NOTHING, without, words))
         return tuple(made)

@@ -213,7 +213,7 @@ class Design(ReadOnlyArrays, Pictured):
             every += [problem.at(gains, one) for one in spread]
         doubt = self._doubt
         if region is not None and region.verdict != "reliable":
-            doubt = "it is an indication"
+            doubt = "the estimate is only an indication"
         return gate_of_loops(every, doubt, flown, noise, override)
 
     def explore(self) -> Explorer:
@@ -393,13 +393,13 @@ class FilterChoice(ReadOnlyArrays, Pictured):
         name = self.design.objective
         words = (
             f"filter at {self.omega:.4g} rad/s, {self.rule}: "
-            f"{figure_in_words(name, self.value)} against "
-            f"{figure_in_words(name, self.ideal.value)} without a filter; the command has "
+            f"{figure_in_words(name, self.value)}, without a filter "
+            f"{figure_in_words(name, self.ideal.value)}. The noise of the command is "
             f"{self.noise_gain:.3g} times the noise of the measurement (white to "
-            f"{self.bandwidth:.4g} rad/s) against {self.ideal_noise_gain:.3g}"
+            f"{self.bandwidth:.4g} rad/s), without a filter {self.ideal_noise_gain:.3g} times"
         )
         if self.noise is not None:
-            words += f", a standard deviation of {self.noise * self.noise_gain:.3g}"
+            words += f", which is a standard deviation of {self.noise * self.noise_gain:.3g}"
         return words
 
     def _picture(self) -> Figure:

@@ -16,8 +16,8 @@ from deadtime.tuning._problem import controller_template
 SOURCES = {
     "SIMC": "Skogestad 2003, equations 23 to 25 with tau_c = theta, by the half rule (10, 11)",
     "AMIGO": "Astrom and Hagglund 2004",
-    "lambda": "Astrom and Hagglund 2006, chapter 6: closed in the lag or three dead times",
-    "Ziegler-Nichols step": "Ziegler and Nichols 1942; Ti of PI is 3 L for L/0.3, as in textbooks",
+    "lambda": "Astrom and Hagglund 2006, chapter 6, with the larger of lag and three dead times",
+    "Ziegler-Nichols step": "Ziegler and Nichols 1942; Ti of PI is 3 L, not L/0.3, as in textbooks",
     "Ziegler-Nichols frequency": "Ziegler and Nichols 1942",
 }
 
@@ -64,7 +64,7 @@ class RuleTable(ReadOnlyArrays):
             if row.rule == rule:
                 return row
         known = ", ".join(row.rule for row in self.rows)
-        raise KeyError(f"{rule!r}: the rules here are {known}")
+        raise KeyError(f"the rule {rule!r} does not exist. Here the rules are {known}")
 
     def __repr__(self) -> str:
         names = list(self.rows[0].gains)

@@ -102,8 +102,8 @@ def none_stable(loop: ControlLoop, found: StableGains) -> str:
     """Error text: no gain is stable, and up to which gain was searched."""
     far = "" if np.isinf(found.most) else f" up to abs(Kp) = {found.most:.4g}"
     return (
-        f"no proportional gain{far} stabilises this loop with its delay of {loop.delay:g} s: "
-        "use a controller with a derivative, such as PV, or give ranges="
+        f"no proportional gain{far} stabilises this loop with its delay of {loop.delay:g} s. "
+        "Use a controller with a derivative, such as PV, or give ranges="
     )
 
 

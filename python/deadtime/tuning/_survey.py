@@ -80,8 +80,8 @@ def surveyed(problem: Problem, shape: Sequence[int] | None) -> Survey:
     )
     late = " or ".join(f"{delay:g}" for delay in problem.delays)
     raise ValueError(
-        f"of {'x'.join(map(str, counts))} gains that were tried in {tried}, none is "
-        f"stable for a delay of {late} s. Other gains may be stable: give other ranges="
+        f"{'x'.join(map(str, counts))} gains were tried in {tried}, and none is stable with a "
+        f"delay of {late} s. Other gains may be stable: give other ranges="
     )
 
 

@@ -153,8 +153,8 @@ pub(crate) fn array_of<'py>(
         }
     } else if is_masked(value)? {
         return Err(PyValueError::new_err(format!(
-            "{} returned a masked value, which is no number: give all numbers, or fill masked \
-             entries",
+            "{} returned a masked value, which is not a number: return numbers only, or fill \
+             masked entries",
             who()
         )));
     }
@@ -190,7 +190,7 @@ fn converted_array<'py>(
     let numpy = value.py().import("numpy")?;
     let refuse = |what: &str| Err(PyTypeError::new_err(format!("{} returned {what}", who())));
     if value.is_none() {
-        return refuse("None: end it with a return statement that gives the values");
+        return refuse("None: let the function return its values");
     }
     let array = numpy.call_method1("asarray", (value,))?;
     let dtype = array.getattr("dtype")?;
@@ -198,19 +198,19 @@ fn converted_array<'py>(
         'b' | 'i' | 'u' | 'f' => {}
         'c' => {
             return refuse(
-                "complex numbers: give real ones, the real and the imaginary part as components \
-                 of their own",
+                "complex numbers: return real numbers, with the real and the imaginary part as \
+                 separate components",
             );
         }
         // NumPy would read None as nan.
         'O' => {
             for item in array.getattr("flat")?.try_iter()? {
                 if item?.is_none() {
-                    return refuse("None in place of a number: give real numbers");
+                    return refuse("None instead of a number: return real numbers");
                 }
             }
         }
-        _ => return refuse(&format!("values of dtype {dtype}: give real numbers")),
+        _ => return refuse(&format!("values of the dtype {dtype}: return real numbers")),
     }
     let floats = numpy.call_method1("asarray", (array, "d"))?;
     Ok(floats.cast_into::<PyArrayDyn<f64>>()?)

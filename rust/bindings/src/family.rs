@@ -304,7 +304,7 @@ fn check_frequencies(omega: &[f64]) -> PyResult<()> {
     let is_wrong = |omega: &&f64| !(omega.is_finite() && **omega > 0.0);
     match omega.iter().find(is_wrong) {
         Some(wrong) => Err(PyValueError::new_err(format!(
-            "frequency {wrong} rad/s: give frequencies above 0"
+            "a frequency is {wrong} rad/s: give frequencies above zero"
         ))),
         None => Ok(()),
     }

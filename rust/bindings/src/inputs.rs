@@ -33,7 +33,7 @@ impl DeviationQuestion {
 
 pub(crate) fn drive(name: &str) -> PyResult<Drive> {
     Drive::named(name)
-        .ok_or_else(|| PyValueError::new_err(format!("{name:?}: there is no such input")))
+        .ok_or_else(|| PyValueError::new_err(format!("the input {name:?} does not exist")))
 }
 
 /// Figures of the deviation of an output.

@@ -79,7 +79,7 @@ pub(crate) struct ControllerForm {
 impl ControllerForm {
     fn read(&self) -> PyResult<Controller> {
         let unknown =
-            |name: &str| PyValueError::new_err(format!("{name:?}: there is no such part"));
+            |name: &str| PyValueError::new_err(format!("the part {name:?} does not exist"));
         let rule = match self.rule.as_deref() {
             Some(name) => Some(Rule::named(name).ok_or_else(|| unknown(name))?),
             None => None,
@@ -160,7 +160,7 @@ fn with_polynomials<T>(
                 .call1((numbers.to_vec(),))
                 .and_then(|found| found.extract::<Given<f64>>()),
             None => Err(PyValueError::new_err(
-                "the polynomials of this plant are needed",
+                "the polynomials of this plant are missing",
             )),
         };
         found
@@ -416,7 +416,7 @@ impl PyLoop {
         let points = axes.values().map(in_order).collect::<PyResult<Vec<_>>>()?;
         let ([first, second], [x, y]) = (&self.places(&names)?[..], &points[..]) else {
             return Err(PyValueError::new_err(format!(
-                "{} axes: a map has two",
+                "a map has two axes, but {} were given",
                 names.len()
             )));
         };

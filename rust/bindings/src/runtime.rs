@@ -168,8 +168,8 @@ impl Drop for Waiting {
 
 fn fork_error() -> PyErr {
     PyRuntimeError::new_err(
-        "this process was forked from within the progress function: the computation goes on in \
-         the parent only; end the child there, or start it in another way",
+        "this process was forked within the progress function. The computation continues only in \
+         the parent, so end the child there, or start it in another way",
     )
 }
 
@@ -251,7 +251,7 @@ pub(crate) fn internal(panic: &(dyn Any + Send)) -> PyErr {
         .or_else(|| panic.downcast_ref::<String>().cloned())
         .unwrap_or_else(|| "unknown reason".to_owned());
     PyRuntimeError::new_err(format!(
-        "deadtime failed internally ({reason}); this is a defect, please report it with the \
+        "a defect in deadtime has stopped this call ({reason}). Please report it, with the \
          arguments of the call"
     ))
 }
@@ -274,8 +274,8 @@ fn pool(threads: Option<usize>) -> PyResult<Arc<Pool>> {
         .build()
         .map_err(|error| {
             PyMemoryError::new_err(format!(
-                "{threads} threads cannot be started ({error}): ask for fewer with threads or \
-                 DEADTIME_NUM_THREADS, or raise the limits on memory and threads"
+                "{threads} threads cannot be started ({error}): give fewer threads by threads= or \
+                 DEADTIME_NUM_THREADS, or raise the limits of memory and threads"
             ))
         })?;
     let built = Arc::new(Pool {
@@ -305,8 +305,8 @@ pub(crate) fn thread_count(threads: Option<usize>) -> PyResult<usize> {
             }
             let threads = text.trim().parse().map_err(|_| {
                 PyValueError::new_err(format!(
-                    "{variable}={text:?} is not a number of threads: set it to a whole number \
-                     of at least 1"
+                    "{variable}={text:?} is not a number of threads: give a whole number of at \
+                     least 1"
                 ))
             })?;
             // Rayon reads 0 as "the machine decides".

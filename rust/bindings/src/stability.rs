@@ -192,7 +192,7 @@ pub(crate) fn with_axes<T>(
     let points: Vec<_> = axes.values().map(in_order).collect::<PyResult<_>>()?;
     let ([first, second], [x, y]) = (&places[..], &points[..]) else {
         return Err(PyValueError::new_err(format!(
-            "{} axes: a map has two",
+            "a map has two axes, but {} were given",
             places.len()
         )));
     };
@@ -297,7 +297,7 @@ impl<T> ByName<T> {
             let found = family.names().iter().position(|known| known == name);
             found.ok_or_else(|| {
                 PyValueError::new_err(format!(
-                    "{name}: no such parameter, there is {}",
+                    "{name} is not a parameter of this expression. Its parameters are {}",
                     family.names().join(", ")
                 ))
             })

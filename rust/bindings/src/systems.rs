@@ -34,7 +34,7 @@ impl PySignal {
                 &in_order(&series)?,
                 breaks,
             ),
-            _ => Err(Error::argument("the series of a signal have three axes")),
+            _ => Err(Error::argument("the series of a signal need three axes")),
         };
         converted(made).map(|inner| Self { inner })
     }

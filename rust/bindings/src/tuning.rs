@@ -22,7 +22,7 @@ type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 
 fn objective_of(name: &str) -> PyResult<Objective> {
     Objective::named(name)
-        .ok_or_else(|| PyValueError::new_err(format!("{name:?}: there is no such objective")))
+        .ok_or_else(|| PyValueError::new_err(format!("the objective {name:?} does not exist")))
 }
 
 fn cores(loops: &[Bound<'_, PyLoop>]) -> Vec<ControlLoop> {

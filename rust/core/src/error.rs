@@ -33,8 +33,8 @@ pub enum Error {
 
     /// A response exceeded the limit for diverging runs.
     #[error(
-        "the response exceeds {bound:e} at t = {time} s after the start: the loop is unstable, end \
-         the simulation earlier, lower the gain or give it a limit"
+        "the response exceeds {bound:e} at t = {time} s after the start, so the loop is unstable. \
+         End the simulation earlier, lower the gain, or give the loop a limit"
     )]
     Diverges {
         /// The limit that it exceeded.
@@ -49,8 +49,8 @@ pub enum Error {
 
     /// Memory that could not be allocated.
     #[error(
-        "{what} needs {} of memory, which is not available: ask for less at once, or raise \
-         the limit",
+        "{what} needs {} of memory, which is not available: compute less at once, or raise the \
+         limit of memory",
         readable_size(*bytes)
     )]
     Memory {
@@ -77,8 +77,8 @@ pub enum Error {
 
     /// A root lies on the contour, or too close to it to decide its side.
     #[error(
-        "a root lies on the contour near {:?}{:+?}i, or closer to it than double precision can \
-         resolve: move the edge of the region by more than {distance:.1e}",
+        "a root lies on the contour near {:?}{:+?}i, or closer to the contour than double \
+         precision can resolve: move the edge of the region by more than {distance:.1e}",
         place.re, place.im
     )]
     Contour {
@@ -90,8 +90,8 @@ pub enum Error {
 
     /// Roots lie on the edge of a region, or closer to it than the radii of their discs.
     #[error(
-        "the edge of the region meets {}; {inside} roots are clearly inside: move the edge, or say \
-         to which side roots on it belong (edge=\"inside\" or \"outside\")",
+        "the edge of the region touches {}, and {inside} roots are clearly inside. Move the edge, \
+         or say on which side roots at the edge count (edge=\"inside\" or \"outside\")",
         described(roots)
     )]
     OnEdge {
@@ -103,7 +103,7 @@ pub enum Error {
 
     /// The number of roots found and the number counted disagree; the error contains both.
     #[error(
-        "{counted} roots were counted in the region but {} could be located: {advice}",
+        "{counted} roots were counted in the region, but only {} were located: {advice}",
         found.iter().map(|(_, m)| m).sum::<u32>()
     )]
     CountMismatch {

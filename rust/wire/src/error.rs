@@ -15,7 +15,7 @@ pub struct Error {
 #[non_exhaustive]
 pub enum Fault {
     /// The bytes end too early.
-    #[error("{length} bytes, of which it takes {needed} at least")]
+    #[error("{length} bytes are too few, because {needed} are needed")]
     Short {
         /// Number of bytes.
         length: usize,
@@ -23,7 +23,7 @@ pub enum Fault {
         needed: usize,
     },
     /// A size that does not belong to this format.
-    #[error("{length} bytes in place of {wanted}")]
+    #[error("{length} bytes instead of {wanted}")]
     Length {
         /// Number of bytes.
         length: usize,
@@ -31,7 +31,7 @@ pub enum Fault {
         wanted: usize,
     },
     /// More bytes than a packet may hold.
-    #[error("{length} bytes, of which there may be {limit} at most")]
+    #[error("{length} bytes are too many, because at most {limit} are allowed")]
     Long {
         /// Number of bytes.
         length: usize,
@@ -39,11 +39,11 @@ pub enum Fault {
         limit: usize,
     },
     /// The first four bytes belong to no known format.
-    #[error("0x{0:08x} is the header of no known format")]
+    #[error("the header 0x{0:08x} does not belong to a known format")]
     Header(u32),
     /// An option of navdata that is smaller than its own head, or ends beyond the packet.
     #[error(
-        "the option of tag {tag} says that it has {size} bytes: 4 at least and {left} at most are \
+        "the option of tag {tag} has a stated size of {size} bytes, but only 4 to {left} are \
          possible"
     )]
     OptionSize {
@@ -55,7 +55,7 @@ pub enum Fault {
         left: usize,
     },
     /// Navdata without a checksum as its last option.
-    #[error("the last option is no checksum")]
+    #[error("the last option is not a checksum")]
     NoChecksum,
     /// The checksum differs from that of the bytes before it.
     #[error("the checksum is {stated}, but the bytes before it sum to {summed}")]
@@ -66,7 +66,7 @@ pub enum Fault {
         summed: u32,
     },
     /// A tag that is reserved for the checksum.
-    #[error("the tag {0} is that of the checksum alone")]
+    #[error("the tag {0} may be used only for the checksum")]
     Tag(u16),
     /// A number that is not finite.
     #[error("{name}={value}: give a finite number")]
@@ -77,7 +77,7 @@ pub enum Fault {
         value: f64,
     },
     /// A number outside the range of its field.
-    #[error("{name}={value} is out of its range")]
+    #[error("{name}={value} is outside of its range")]
     Range {
         /// Its name.
         name: &'static str,
@@ -85,7 +85,7 @@ pub enum Fault {
         value: f64,
     },
     /// A character that is not allowed in this text.
-    #[error("{name} holds the byte 0x{byte:02x}, which has no place in it")]
+    #[error("{name} contains the byte 0x{byte:02x}, which is not allowed there")]
     Sign {
         /// Name of the text.
         name: &'static str,
@@ -93,22 +93,22 @@ pub enum Fault {
         byte: u8,
     },
     /// A name that is invalid, or that of a command with a type of its own.
-    #[error("\"{0}\" is no name of another command")]
+    #[error("\"{0}\" is not the name of a command")]
     Name(String),
     /// Bytes that are no UTF-8 text.
-    #[error("these bytes are no UTF-8 text")]
+    #[error("the bytes are not UTF-8 text")]
     Text,
     /// A line of the configuration without "section:key = value".
-    #[error("a line that is not of the form \"section:key = value\"")]
+    #[error("a line does not have the form \"section:key = value\"")]
     Line,
     /// A key of the configuration that occurs twice, with two values.
     #[error("the key {0} has two different values")]
     Twice(String),
     /// The configuration does not end with a NUL byte.
-    #[error("there is no NUL byte that ends the configuration")]
+    #[error("the NUL byte at the end of the configuration is missing")]
     NoEnd,
     /// Bytes after the end of the configuration.
-    #[error("bytes after the NUL that ends the configuration")]
+    #[error("there are bytes after the NUL byte that ends the configuration")]
     AfterEnd,
     /// A field of a flight log with an encoding or a predictor that is not known.
     #[error("the {name} {code} of a field is not known")]
@@ -119,7 +119,7 @@ pub enum Fault {
         code: u8,
     },
     /// Fields of a flight log that are encoded together, but are not as many as it takes.
-    #[error("{run} fields have an encoding that takes {group} together")]
+    #[error("{run} fields have an encoding for groups of {group} fields")]
     Group {
         /// Number of fields.
         run: usize,
@@ -128,7 +128,8 @@ pub enum Fault {
     },
     /// Few bytes that decode to more values than any flight.
     #[error(
-        "the frames decode to more than {limit} values, more than so few bytes of a flight hold"
+        "the frames decode to more than {limit} values, which is too many for so few bytes of a \
+         flight"
     )]
     Values {
         /// Upper limit.

@@ -48,12 +48,12 @@ fn faults_name_the_line() {
         ),
         (
             "0,1\r1,2,3\r",
-            "line 3: 3 cells under 2 column names; if commas stand for decimal \
-          points, write points, or separate the columns by semicolons",
+            "line 3 has 3 cells, but there are 2 column names. If commas are decimal \
+          marks, write points, or separate the columns by semicolons",
         ),
         (
             "0,1\r\n1\r\n",
-            "line 3: 1 cells, so the column 'y' has none",
+            "line 3 has 1 cells, so the cell of the column 'y' is missing",
         ),
         (
             "0,\"a\nb\"\n",
@@ -65,18 +65,17 @@ fn faults_name_the_line() {
         ),
         (
             "0,\"1\"2\n",
-            "line 2: this is not a CSV file: behind the closing quote of a cell stands \
-          no separator",
+            "line 2: this is not a CSV file: a cell continues after its closing quote",
         ),
         (
             "0,\"1,5\"\n1,1.5\n",
-            "line 3: '1.5' in column 'y' has a decimal point, and line 2 has the \
-          other: write a decimal point in all cells",
+            "line 3: '1.5' in column 'y' has a decimal point, but line 2 has the \
+          other mark: write a decimal point in all cells",
         ),
         (
             "0,\"1,500\"\n",
             "line 2: '1,500' in column 'y' may be 1.5 or 1500, and no other cell \
-          tells which: write a decimal point, or no comma",
+          shows which: write a decimal point, or no comma",
         ),
     ] {
         let found = two(table).map_err(|fault| fault.to_string());
@@ -121,7 +120,7 @@ fn dates_are_seconds_after_the_first() {
         assert!(two(&format!("{wrong},1")).is_err(), "{wrong}");
     }
     let mixed = two("1,1\n2024-01-01 00:00,2").unwrap_err().to_string();
-    assert!(mixed.contains("is a date, and the times above it are numbers"));
+    assert!(mixed.contains("is a date, but the times above are numbers"));
 }
 
 #[test]

@@ -48,14 +48,14 @@ def checked_names(
         free = (free,)
     unknown = [name for name in free if name not in known]
     if unknown or not free:
-        raise ValueError(f"free={tuple(free)!r}: choose from {known}, at least one")
+        raise ValueError(f"free={tuple(free)!r}: choose one or more from {known}")
     given = {"delay", "start"}
     missing = [name for name in free if name not in given and name not in loop.parameters]
     if missing:
         raise ValueError(
-            f"this loop has no {missing[0]} to fit (its parameters are "
-            f"{', '.join(loop.parameters)}): give the loop an initial value of this "
-            "parameter, or leave the parameter out of `free`"
+            f"this loop has no {missing[0]} that could be fitted (its parameters "
+            f"are {', '.join(loop.parameters)}): give the loop an initial value "
+            "of this parameter, or leave the parameter out of `free`"
         )
     if "delay" not in free and loop.delay is None:
         raise ValueError(
@@ -98,8 +98,8 @@ def check_distinguishable(jacobian: Array, names: Sequence[str]) -> None:
         weights = np.abs(directions[-1])
         mixed = [name for name, weight in zip(names, weights, strict=True) if weight > 0.2]
         raise NotIdentifiableError(
-            f"this recording cannot separate the effects of {' and '.join(mixed)}. Fix one of "
-            "them, or record a step that does not keep the command at its limit throughout"
+            f"this recording cannot separate the effects of {' and '.join(mixed)}. Fix "
+            "one, or record a step that does not keep the command at its limit throughout"
         )
 
 
@@ -134,9 +134,9 @@ def check_response(output: Array, misfit: Array, numbers: int, autocorrelation: 
     if not ratio > 0.0 or special.fdtrc(numbers, freedom, ratio) > F_TEST_LEVEL:
         explained = 100.0 * max(0.0, 1.0 - fitted / constant) if constant > 0.0 else 0.0
         raise NotIdentifiableError(
-            "the output does not respond to the excitation: the best fit explains "
-            f"{explained:.0f} % of its variance, no more than for noise alone. Check columns, "
-            "signs and gains, choose a window with a step, or record a larger step"
+            "the output does not respond to the excitation, because the best fit explains "
+            f"only {explained:.0f} % of the output's variance, as for noise alone. Check "
+            "columns, signs and gains, choose a window with a step, or record a larger step"
         )
 
 
@@ -191,7 +191,7 @@ def check_even(data: Recording, share: float, why: str) -> None:
     steps, row = np.diff(data.time), data.sample_time
     if float(np.max(np.abs(steps - row))) > share * row:
         raise NotIdentifiableError(
-            f"the samples are {float(steps.min()):g} to {float(steps.max()):g} s apart: {why}"
+            f"the samples are {float(steps.min()):g} to {float(steps.max()):g} s apart, but {why}"
         )
 
 
@@ -206,8 +206,8 @@ def check_excitation(data: Recording, numbers: int, *, in_motion: bool = False) 
     left = len(data) - (steps[0].index if steps else 0)
     if left < 2 * (numbers + 1):
         raise NotIdentifiableError(
-            f"{left} samples after the step are too few to fit {numbers} parameters and an "
-            "initial output: widen the window"
+            f"{left} samples after the step are too few to fit {numbers} "
+            "parameters and an initial output: choose a longer window"
         )
     check_moves(data.output)
 
@@ -227,9 +227,9 @@ def check_gain(values: Mapping[str, float], errors: Mapping[str, float]) -> None
     """Refuse a fitted gain that may be zero: any delay would then fit as well."""
     if "gain" in values and abs(values["gain"]) < LEAST_GAIN * errors["gain"]:
         raise NotIdentifiableError(
-            f"the gain is estimated as {values['gain']:.2g} ± {errors['gain']:.2g}, which may "
-            "be zero. Either the output does not respond to the input, or noise hides the "
-            "response. Check columns and units"
+            f"the gain is estimated as {values['gain']:.2g} ± {errors['gain']:.2g}, "
+            "so it may be zero. Either the output does not respond to the input, "
+            "or noise hides the response. Check columns and units"
         )
 
 
@@ -239,7 +239,7 @@ def check_ends(names: Sequence[str], point: Array, low: Array, high: Array) -> N
         for end in (most,) if name in ("delay", "lag") else (least, most):
             if np.isfinite(end) and abs(value - end) <= 1e-3 * abs(end):
                 raise NotIdentifiableError(
-                    f"the fit ends at a {name} of {end:g}, a bound of its search. So the "
-                    "output is not a response of this loop to this reference. Check columns, "
+                    f"the search ends at its bound, a {name} of {end:g}. So the output "
+                    "is not a response of this loop to this reference. Check columns, "
                     "signs, units and gains, and choose a window around one step"
                 )

@@ -77,13 +77,13 @@ def read_input_output(simulated: SimulatedRecording, method: str) -> InputOutput
     """
     data, loop = simulated.recording, simulated.loop
     h = data.sample_time
-    use = "needs even ones; use method='output_error' or 'waveform'"
+    use = "needs evenly spaced samples. Use method='output_error' or 'waveform'"
     check_even(data, EVEN, f"the {method} method {use}")
     command, _ = commands_over_samples(data, loop)
     if len(data) < FEWEST:
         raise NotIdentifiableError(
-            f"{len(data)} samples are too few for the {method} method, {FEWEST} are needed: widen "
-            "the window"
+            f"{len(data)} samples are too few for the {method} "
+            f"method, which needs {FEWEST}: choose a longer window"
         )
     check_moves(data.output, command)
     plant, output = loop.plant, data.output
@@ -95,7 +95,7 @@ def read_input_output(simulated: SimulatedRecording, method: str) -> InputOutput
         response = (moved[1:] - kept * moved[:-1]) / (1.0 - kept)
         resting = float(output[0]) / plant.gain
         return InputOutput(command[:-1] - resting, response, h, 0.0, "")
-    remark = "; the plant was not inverted, so its lag is part of the delay"
+    remark = ". The plant was not inverted, so its lag is part of the delay"
     centred = output - float(output.mean())
     return InputOutput(command - float(command.mean()), centred, h, 0.5 * h, remark)
 

@@ -64,23 +64,23 @@ class KnownFilter:
             b, a = (np.atleast_1d(np.asarray(part, dtype=np.float64)) for part in given)
         except (TypeError, ValueError):
             raise TypeError(
-                f"output_filter={given!r}: give (b, a), the coefficients in powers of 1/z"
+                f"output_filter={given!r}: give (b, a), two lists of coefficients in powers of 1/z"
             ) from None
         for name, part in (("b", b), ("a", a)):
             if part.ndim != 1 or not np.all(np.isfinite(part)) or not np.any(part):
                 raise ValueError(f"{name}={part.tolist()}: give finite coefficients, not all zero")
         if a[0] == 0.0 or np.any(np.abs(np.roots(a)) >= 1.0):
             raise ValueError(
-                f"a={a.tolist()}: a filter with these coefficients is not stable; check the "
-                "coefficients"
+                f"a={a.tolist()}: the filter with these "
+                "coefficients is not stable. Check the coefficients"
             )
         zeros = np.roots(b)
         sizes, fast = np.abs(zeros), zeros.real < 0.0
         if np.any(sizes > 1.0 + 1e-6) or np.any(sizes[~fast] > LARGEST_LOW):
             raise ValueError(
-                f"b={b.tolist()}: the filter cannot be undone. It removes a frequency that "
-                "the response needs, or has a zero outside the unit circle. Leave the filter "
-                "out"
+                f"b={b.tolist()}: the filter cannot be undone, because "
+                "it removes a frequency of the response or has a zero "
+                "outside the unit circle. Leave the filter out"
             )
         moved = np.where(
             fast & (sizes > LARGEST), zeros * LARGEST / np.maximum(sizes, LARGEST), zeros
@@ -137,8 +137,8 @@ def before_filter(recording: Recording, rows: slice, known: KnownFilter) -> Reco
     between = float(np.mean(steps))
     if np.max(np.abs(steps - between)) > EVEN * between:
         raise NotIdentifiableError(
-            f"rows are {steps.min():g} to {steps.max():g} s apart, but a filter can be undone "
-            "only in evenly spaced rows: cut the recording where rows are missing"
+            f"rows are {steps.min():g} to {steps.max():g} s apart, but a filter can be "
+            "undone only in evenly spaced rows: choose a window without missing rows"
         )
     together = known.together
     first = max(rows.start, known.start)

@@ -50,15 +50,15 @@ def whole_periods(data: Recording, period: float, left_out: int, highest: float)
     samples = round(period / h)
     if abs(period / h - samples) > WHOLE or samples < 4:
         raise ValueError(
-            f"period={period:g} s is {period / h:.4g} samples of {h:g} s: give a period of a "
-            "whole number of samples, at least four"
+            f"period={period:g} s is {period / h:.4g} samples of {h:g} s: "
+            "give a period that is a whole number of samples, at least four"
         )
     begin = whole_number("left_out", left_out, least=0) * samples
     periods = (len(data) - begin) // samples
     if periods < 2:
         raise NotIdentifiableError(
-            f"{max(0, periods)} periods of {period:g} s remain after {left_out} are left out, "
-            "but their covariance needs at least two: record longer"
+            f"{max(0, periods)} periods of {period:g} s remain after {left_out} are "
+            "left out, but at least two are needed for their covariance: record longer"
         )
     begin = len(data) - periods * samples  # the last ones, in which the transient has decayed most
 
@@ -66,8 +66,8 @@ def whole_periods(data: Recording, period: float, left_out: int, highest: float)
     spread = float(np.max(np.ptp(reference, axis=0)))
     if spread > 1e-6 * float(np.ptp(reference)) or float(np.ptp(reference)) == 0.0:
         raise NotIdentifiableError(
-            f"the reference does not repeat every {period:g} s (periods differ by {spread:.3g}, "
-            "or the reference is constant): give the period of Experiment.multisine"
+            f"the reference does not repeat every {period:g} s (its periods differ by "
+            f"{spread:.3g}, or it is constant): give the period of Experiment.multisine"
         )
     power = np.abs(np.fft.rfft(reference[0]))
     power[0] = 0.0  # the mean of an integrator's output holds no information

@@ -117,8 +117,8 @@ def commands_of(recording: Recording, loop: ControlLoop, computed: bool) -> tupl
     if abs(between - loop.sample_time) > ON_SAMPLES * loop.sample_time:
         raise NotIdentifiableError(
             f"rows are {between:g} s apart, but the controller samples every "
-            f"{loop.sample_time:g} s. Its command cannot be computed from such rows. Log the "
-            "command, or use method='waveform'"
+            f"{loop.sample_time:g} s, so its command cannot be computed from "
+            "such rows. Log the command, or use method='waveform'"
         )
     return found
 
@@ -198,20 +198,20 @@ def shortest_time(window: Recording) -> float:
 
 def _check_work(window: Recording, loop: ControlLoop) -> None:
     """Refuse windows whose fit, some hundred simulations, would take minutes."""
-    advice = "use a window around one step"
+    advice = "choose a window around one step"
     if len(window) > MOST_SAMPLES:
         raise RecordingError(
-            f"{len(window)} samples exceed the {MOST_SAMPLES} that a fit can simulate in "
-            f"reasonable time: {advice}, or keep every tenth sample"
+            f"{len(window)} samples are more than the {MOST_SAMPLES} that a fit "
+            f"can simulate in reasonable time: {advice}, or keep every tenth sample"
         )
     held = 0.0
     if loop.sample_time is not None:
         held = float(window.time[-1] - window.time[0]) / loop.sample_time
     if held > MOST_SAMPLES:
         raise RecordingError(
-            f"the recording lasts {window.time[-1] - window.time[0]:g} s, {held:.3g} times the "
-            f"sample_time of {loop.sample_time:g} s: {advice}, and check that its time stamps are "
-            "seconds"
+            f"the recording lasts {window.time[-1] - window.time[0]:g} s, which "
+            f"is {held:.3g} times the sample_time of {loop.sample_time:g} s: "
+            f"{advice}, and check that the time stamps are seconds"
         )
 
 

@@ -92,14 +92,14 @@ def read_step(recording: Recording) -> StepReading:
     steps = recording.steps()
     if not steps:
         raise NotIdentifiableError(
-            "the reference is constant in the window, so the window has no step: begin the "
-            "window some samples before a step"
+            "the reference is constant in the window, so there is "
+            "no step: begin the window some samples before a step"
         )
     if len(steps) > 1:
         times = ", ".join(f"{step.time:g}" for step in steps[:6])
         raise NotIdentifiableError(
-            f"the window has {len(steps)} steps of the reference (at {times} s): choose a "
-            "window with one step"
+            f"the reference has {len(steps)} steps in the window "
+            f"(at {times} s): choose a window with one step"
         )
     step = steps[0]
     after = recording.output[step.index :]
@@ -107,24 +107,24 @@ def read_step(recording: Recording) -> StepReading:
     before = before[recording.time[: step.index] >= step.time - BEFORE_STEP]
     if before.size == 0 or after.size < 4:
         raise NotIdentifiableError(
-            f"the window has only {before.size} samples before and {after.size} after the "
-            f"step at {step.time:g} s: widen the window"
+            f"the window has only {before.size} samples before the step at "
+            f"{step.time:g} s and {after.size} after the step: choose a longer window"
         )
     start = float(before.mean())
     size = step.after - start
     if size == 0.0 or math.copysign(1.0, size) != math.copysign(1.0, step.amplitude):
         raise NotIdentifiableError(
-            f"the output is {start:g} before the step from {step.before:g} to {step.after:g}, "
-            "so the loop was not at rest: choose a window that begins at rest"
+            f"before the step from {step.before:g} to {step.after:g} the output is "
+            f"{start:g}, so the loop was not at rest: choose a window that begins at rest"
         )
     travelled = (after - start) / size
     since = recording.time[step.index :] - step.time
     tail = travelled[-max(4, travelled.size // 4) :]
     if float(np.mean(tail)) < FOLLOWS:
         raise NotIdentifiableError(
-            f"the output ends at {100 * float(np.mean(tail)):.3g} % of the step at "
-            f"{step.time:g} s, so it does not follow the reference: check columns and units, "
-            "or widen the window"
+            f"the output ends at {100 * float(np.mean(tail)):.3g} % of the "
+            f"step at {step.time:g} s, so it does not follow the "
+            "reference: check columns and units, or choose a longer window"
         )
     noise = _noise(before, after[-max(4, after.size // 4) :]) / abs(size)
     return StepReading(step, start, before.size, size, noise, since, travelled)
@@ -184,9 +184,9 @@ def check_decays(extremes: Sequence[Extreme], method: str) -> None:
     """Refuse a sustained oscillation, for a method of linear theory."""
     if not extremes_decay(list(extremes)):
         raise NotIdentifiableError(
-            f"the {len(extremes)} peaks and valleys do not decay: the last is "
-            f"{extremes[-1].height / extremes[1].height:.3g} times the second. The loop is in "
-            f"a limit cycle, or at its stability limit, but the {method} method assumes a "
-            "stable linear loop. Use method='output_error' or 'waveform' (or 'relay', if the "
-            "command only switches), or a lower Kp"
+            f"the {len(extremes)} peaks and valleys do not decay: the last has "
+            f"{extremes[-1].height / extremes[1].height:.3g} times the height of the "
+            f"second. The {method} method assumes a stable linear loop, but this loop "
+            "is in a limit cycle or at its stability limit. Use method='output_error' "
+            "or 'waveform' (or 'relay', if the command only switches), or a lower Kp"
         )

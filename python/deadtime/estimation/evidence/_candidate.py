@@ -74,8 +74,8 @@ class PlantCandidate(ReadOnlyArrays):
         lags = [_time(lag) for lag in self.lags]
         if "pole_frequency" in numbers:
             kind += (
-                f" and swings: {numbers['pole_frequency']:.3g} rad/s, damping "
-                f"{numbers['pole_damping']:.2g}"
+                f" and oscillates at {numbers['pole_frequency']:.3g} "
+                f"rad/s with damping {numbers['pole_damping']:.2g}"
             )
         elif lags and self.integrates:
             kind += f", after a lag of {' and one of '.join(lags)}"

@@ -14,38 +14,37 @@ REACH = 1.96
 #: What each cause of the kernel is called, and what it says of size and time.
 WORDS = {
     "load": "a load of {size} in units of the command begins at {time}",
-    "output step": "the output jumps by {size} at {time} although the plant does not move",
+    "output step": "the output jumps by {size} at {time}, although the plant does not move",
     "delay change": "the delay changes by {size} s at {time}",
     "dead zone": "commands within ±{size} have no effect",
-    "play": "the actuator has a play of {size}",
-    "stiction": "the actuator sticks until the command is {size} away from it",
+    "play": "the actuator has a backlash of {size}",
+    "stiction": "the actuator sticks until the command differs from its position by {size}",
     "upper limit": "the command has no further effect above {size}",
     "lower limit": "the command has no further effect below -{size}",
-    "rate limit": "the input of the plant changes by at most {size} in a second",
-    "slope limit": "the plant's response changes by at most {size} of the command in a second",
+    "rate limit": "the input of the plant changes by at most {size} per second",
+    "slope limit": "the response of the plant changes by at most {size} of the command per second",
     "drag": "a force of {size} times the square of the speed slows the motion",
-    "gain ramp": "the gain changes by {share} over the recording",
+    "gain ramp": "the gain changes by {share} during the recording",
     "gain by level": "the gain changes by {share} over the range of the output",
-    "jitter": "commands arrive at times that scatter by {size} s",
+    "jitter": "the times at which commands arrive have a standard deviation of {size} s",
 }
 
 #: What to do about each.
 REMEDIES = {
     "load": "if the load can be avoided, record without the load",
-    "output step": "check the sensor, or the estimator behind it, at that time",
-    "delay change": "make an estimate before the change and one after, each with a window",
+    "output step": "check the sensor, or the estimator that filters it, at that time",
+    "delay change": "make two estimates, with one window before the change and one after it",
     "dead zone": "compensate the dead zone in the controller, or use larger commands",
-    "play": "remove the play, or use changes of the command that are large compared with the play",
-    "stiction": "free the actuator, or use changes of the command that are large compared with the "
-    "sticking",
-    "upper limit": "give the controller this limit",
-    "lower limit": "give the controller this limit",
+    "play": "remove the backlash, or use changes of the command much larger than the backlash",
+    "stiction": "free the actuator, or use changes of the command much larger than this difference",
+    "upper limit": "give the controller this limit of the command",
+    "lower limit": "give the controller this limit of the command",
     "rate limit": "give the loop this limit of the command's rate",
     "slope limit": "keep commands below this limit, or give the plant this limit",
-    "drag": "use the gain only for speeds as in this recording",
-    "gain ramp": "find the cause of the change, such as a battery or a temperature",
-    "gain by level": "record around the level at which the loop is to work",
-    "jitter": "log the times at which commands are sent, or send them by a steady clock",
+    "drag": "use the gain only for speeds that occur in this recording",
+    "gain ramp": "find out why the gain changes, for example with the battery or the temperature",
+    "gain by level": "record around the output at which the loop has to work",
+    "jitter": "log the times at which commands are sent, or send commands at a constant rate",
 }
 
 #: Both sides of a limit have one name.
@@ -53,9 +52,9 @@ NAMES = {"upper limit": "unequal limits", "lower limit": "unequal limits"}
 
 SENSOR_WORDS = {
     "frozen": "the sensor is frozen for {rows} rows from {start:.4g} to {stop:.4g} s",
-    "repeated": "the sensor repeats its reading in {rows} rows, {size:.3g} s old in the mean",
+    "repeated": "{rows} rows repeat a reading that is {size:.3g} s old on average",
     "glitch": "the sensor has glitches in {rows} rows",
-    "smoothed": "the readings are a centred moving mean of {size:.3g} rows",
+    "smoothed": "each reading is a centred moving mean of {size:.3g} rows",
 }
 
 

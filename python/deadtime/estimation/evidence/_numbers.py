@@ -197,12 +197,12 @@ class FoundPlant(ReadOnlyArrays):
     def _check(self, level: float, name: str) -> None:
         """Refuse an interval that there is not."""
         if not 0.0 < level < 1.0:
-            raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
+            raise ValueError(f"level={level!r} is not between 0 and 1: give a level such as 0.95")
         if self.verdict == "none":
             raise ValueError(f"no interval: {self.reason}")
         if name not in self.intervals:
             names = ", ".join(self.intervals)
-            raise ValueError(f"{name!r} has no interval; there are intervals only for {names}")
+            raise ValueError(f"{name!r} has no interval. There are intervals only for {names}")
 
     def value(self, name: str) -> float:
         """The number that an interval belongs to.
@@ -233,7 +233,7 @@ class FoundPlant(ReadOnlyArrays):
         given = one_dimensional("omega", np.atleast_1d(np.asarray(omega, dtype=float)))
         bad = given[~(given > 0.0)]
         if bad.size:
-            raise ValueError(f"omega={bad[0]:g} rad/s: give a frequency above zero")
+            raise ValueError(f"omega={bad[0]:g} rad/s: give frequencies above zero")
         found = self._answer().at(given.tolist())
         values = {name: np.array(found[name][0]) for name in ("gain", "phase", "delay")}
         ends = {f"{name}_ci": np.array(found[name][1:]) for name in values}

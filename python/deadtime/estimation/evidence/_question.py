@@ -180,7 +180,7 @@ def questions_of(
     """The question about one recording, or about several of one plant."""
     recordings = [recording] if isinstance(recording, Recording) else list(recording)
     if not recordings:
-        raise ValueError("no recording was given: give one, or a list of them")
+        raise ValueError("no recording was given: give a recording, or a list of recordings")
     is_list = isinstance(window, (tuple, list)) and not (len(window) == 2 and is_range(window))
     windows = _each("window", window, not is_list, len(recordings))
     is_list = isinstance(controller, (tuple, list))
@@ -213,14 +213,14 @@ def question_of(
 ) -> Question:
     """Check what the caller has given of one recording."""
     if not isinstance(recording, Recording):
-        raise TypeError(f"recording must be a Recording, got {type(recording).__name__}")
+        raise TypeError(f"recording must be a Recording, not {type(recording).__name__}")
     shift = 0
     if controller is not None:
         recording, shift = _with_command(recording, controller, limit)
     elif limit is not None:
         raise ValueError(
-            f"limit={limit!r} is the limit of a controller, but no controller is given: give "
-            "the controller too"
+            f"limit={limit!r} is a limit of the controller, but "
+            "no controller is given: give the controller too"
         )
     if recording.command is None:
         raise RecordingError(
@@ -259,8 +259,8 @@ def _with_command(
     has_law = isinstance(controller, P) and recording.has_reference
     if recording.command is None and not has_law:
         raise RecordingError(
-            "the recording has no command. A command follows from reference and output only "
-            "for a P controller. Name the column of the command"
+            "the recording has no command, which can be computed from reference "
+            "and output only for a P controller. Name the column of the command"
         )
     if recording.command is None:
         columns = Columns(recording.time, recording.reference, recording.output, None)

@@ -67,8 +67,8 @@ def beside_rivals(fit: DelayEstimate, run: Run, method: Method) -> DelayEstimate
         return fit
     ends = between(*found.hull["delay"], math.nan, "s")
     why = (
-        f"{rival.in_words()}, explains the recording clearly better, by {lead:.3g} in BIC; its "
-        f"dead time is {rough(rival.delay, 's')} ({ends})"
+        f"{rival.in_words()}, explains the recording clearly better, by {lead:.3g} "
+        f"in BIC, with a dead time of {rough(rival.delay, 's')} ({ends})"
     )
     plant = fit.loop.plant
     if best.plant == kind_of(plant, list(plant.parameters)):

@@ -32,7 +32,7 @@ NUMBERS = (
     ("gain", "gain", ""),
     ("lag", "time constant", "s"),
     ("largest_gain", "largest stable gain", ""),
-    ("crossover", "crossover of half of it", "rad/s"),
+    ("crossover", "crossover at half gain", "rad/s"),
     ("delay_at_crossover", "equivalent delay there", "s"),
     ("gain_at_crossover", "gain there", ""),
 )
@@ -89,7 +89,7 @@ def _python(value: Any) -> str:
 
 
 #: Why an estimate is none, or no more than an indication, where the command moves at the beginning.
-TOO_EARLY = "the command moves only before the rows that the fit uses"
+TOO_EARLY = "the command moves only before the rows that are fitted"
 TAKEN_AT_REST = "the plant is assumed at rest at the first row, which the recording does not show"
 
 #: The kernel's reason where residuals are no noise of a sensor.
@@ -112,31 +112,31 @@ def reason_of(code: str, found: native.FamilyFit, is_one_step: bool, step: float
     size, determined, asked = found.reason_size, found.told, found.asked
     if step and code in ("", NOT_WHITE, "no response"):
         return (
-            f"the sensor reads in steps of {step:.4g}, too coarse for the range of the "
-            "output, so the residuals are mostly rounding"
+            f"the sensor reads in steps of {step:.4g}, too coarse for the "
+            "range of the output, so the residuals are mostly rounding errors"
         )
     if is_one_step and code in FEW_NUMBERS:
         return (
-            "one step cannot distinguish two lags from a dead time and a lag, and the largest "
-            "stable gain depends on this difference"
+            "one step cannot distinguish two lags from a dead time and a "
+            "lag, but the largest stable gain depends on this difference"
         )
     sentences: Mapping[str, str] = {
         "": "",
-        "too few told": "the command moves too little: the recording determines only "
-        f"{determined} of the {asked} parameters of the plant"
+        "too few told": "the command changes too little, so the recording determines "
+        f"only {determined} of the {asked} parameters of the plant"
         if determined < asked
         else "the command is a single sine, which determines gain and phase only at its frequency",
         "classes contradict": "plants of different kinds explain the recording equally well, "
         "but have different crossover frequencies",
-        NOT_WHITE: "the residuals are more than sensor noise: there is a disturbance, or the "
-        "plant is of another kind",
-        "command shifted": "the recording is explained better if the command is one row later "
-        f"or earlier (by {size:.3g} in 2 ln L), so the command was shifted",
-        "delay at its limit": f"the dead time, {size:.4g} s, is at the limit of what is tried",
-        "lag at its limit": f"a time constant, {size:.4g} s, is at the limit of what is tried, far "
-        "longer than the recording",
-        "zero at its limit": f"the zero, {size:.4g} s, is at the limit of what is tried",
-        "crossover not told": "the largest stable gain is not known to a factor of 2",
+        NOT_WHITE: "the residuals are larger than sensor noise, so there "
+        "is a disturbance, or the plant is of another kind",
+        "command shifted": "the recording fits better if the command is shifted by a "
+        f"row (by {size:.3g} in 2 ln L), so the command was shifted",
+        "delay at its limit": f"the dead time, {size:.4g} s, is the largest that was tried",
+        "lag at its limit": f"a time constant, {size:.4g} s, is the largest "
+        "that was tried, far longer than the recording",
+        "zero at its limit": f"the zero, {size:.4g} s, is the largest that was tried",
+        "crossover not told": "the largest stable gain is uncertain by more than a factor of 2",
         "no response": "the output does not respond to the command",
     }
     return sentences.get(code, code)
@@ -182,7 +182,7 @@ def _numbers(fit: FoundPlant) -> list[str]:
             lines.append(f"{words:<24} about {rough(value, unit)}")
     if math.isfinite(fit.crossover_in_loop):
         lines.append(
-            f"with its controller the loop crosses over at {fit.crossover_in_loop:.3g} rad/s"
+            f"with its controller, the loop has its crossover at {fit.crossover_in_loop:.3g} rad/s"
         )
     if not math.isfinite(fit.largest_gain):
         lines.append("no proportional gain makes the loop unstable")
@@ -199,8 +199,8 @@ def _seen(fit: FoundPlant) -> list[str]:
         return []
     view = fit.at(fit.excited)
     return [
-        f"at {omega:.4g} rad/s: gain {_ends(gain)}, equivalent delay {_ends(delay, 's')} (95 %), "
-        f"or this plus multiples of the half period of {rough(math.pi / omega, 's')}"
+        f"at {omega:.4g} rad/s: gain {_ends(gain)}, equivalent delay {_ends(delay, 's')} (95 "
+        f"%), or this delay plus multiples of half a period, {rough(math.pi / omega, 's')}"
         for omega, gain, delay in zip(
             fit.excited.tolist(), view.gain_ci.T, view.delay_ci.T, strict=True
         )
@@ -213,16 +213,16 @@ def _beside(fit: FoundPlant) -> list[str]:
     lines = []
     if fit.better is not None:
         lines.append(
-            f"{fit.better.in_words()} explains the recording clearly better: by "
-            f"{-fit.better.behind:.3g} in BIC"
+            f"{fit.better.in_words()} explains the recording "
+            f"clearly better: by {-fit.better.behind:.3g} in BIC"
         )
     for second in fit.candidates[1:2] if fit.verdict != "none" else ():
-        clear = "clearly behind" if second.behind >= CLEAR else "not ruled out, it is behind"
-        lines.append(f"second: {second.in_words()}; {clear}, by {second.behind:.3g} in BIC")
+        clear = "clearly behind" if second.behind >= CLEAR else "possible too, but behind"
+        lines.append(f"second best: {second.in_words()}; {clear}, by {second.behind:.3g} in BIC")
     if fit.shift:
         lines.append(
-            f"the command is {abs(fit.shift)} row {'early' if fit.shift > 0 else 'late'} in the "
-            "recording, and was shifted"
+            f"in the recording the command is {abs(fit.shift)} row "
+            f"{'early' if fit.shift > 0 else 'late'}, so the command was shifted"
         )
     lines += [f"found: {cause.in_words()}: {cause.remedy}" for cause in fit.causes]
     for fault in fit.sensor_faults:
@@ -233,8 +233,8 @@ def _beside(fit: FoundPlant) -> list[str]:
         where = f" of recording {place}" if fit.others else ""
         if rows:
             lines.append(
-                f"unexplained: {run.noise_std:.3g} (standard deviation) in {rows} rows, "
-                f"{shown(run.recording.sample_time, 0.0, 's')} apart{where}"
+                f"unexplained: a standard deviation of {run.noise_std:.3g} in {rows} rows, "
+                f"which are {shown(run.recording.sample_time, 0.0, 's')} apart{where}"
             )
     return lines
 
@@ -248,19 +248,19 @@ def advice_on(fit: FoundPlant) -> Advice:
 def _advice_on(fit: FoundPlant) -> Advice:
     if fit.verdict == "reliable":
         if fit.best.name == "delay":
-            return Advice("nothing: the output is the delayed command")
+            return Advice("nothing, because the output is the delayed command")
         kind = "P" if fit.best.integrates else "PI"
         return Advice(
             f"design a {kind} controller for the whole interval of the dead time", controller=kind
         )
     if fit._better is not None:
         return Advice(
-            "leave out the plant, because another plant is likelier",
+            "leave out the plant, because another kind of plant is more likely",
             {"plant": None},
             fit._question.options(),
         )
     if fit._code == TAKEN_AT_REST or fit.reason == TOO_EARLY:
-        words = "if the plant was at rest at the first row, say so"
+        words = "if the plant was at rest at the first row, give this information"
         return Advice(words, {"at_rest": True}, fit._question.options())
     advice = _advice_by_reason(fit, fit._question.options())
     if advice.options and fit.reason.endswith(TAKEN_AT_REST):
@@ -273,21 +273,24 @@ def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
         known = [one for one in fit.candidates if len(one.parameters) <= fit.determined]
         words = "record again with a command that steps up and down at irregular intervals"
         if known and "plant" not in given:
-            words += f"; or name the plant, if you know that it is {known[0].in_words()}"
+            words += (
+                f"; or, if you know that the plant is {known[0].in_words()}, name this kind of "
+                "plant"
+            )
             return Advice(words, {"plant": known[0].name}, given)
         return Advice(words)
     if fit.reason.startswith("the sensor reads in steps"):
-        return Advice("use larger changes of the command, or read the sensor in finer steps")
+        return Advice("use larger changes of the command, or a sensor with finer steps")
     if fit._code == "no response":
-        return Advice("check that these are the right columns", draw=True)
+        return Advice("check that command and output are the right columns", draw=True)
     window = None if fit.others else _reliable_part(fit._question)
     if window is not None:
         ends = " to ".join(f"{end:g}" for end in window)
-        words = f"the plant explains the recording from {ends} s on: use only this part"
+        words = f"use only the part from {ends} s, which the plant explains"
         return Advice(words, {"window": window}, given)
     if fit._code == "delay at its limit":
         larger = float(f"{2.0 * fit.delay:.3g}")
-        return Advice("allow a larger dead time", {"largest_delay": larger}, given)
+        return Advice("allow a longer dead time", {"largest_delay": larger}, given)
     return Advice(
         "find the times at which the residuals are large, and leave these times out with a window",
         draw=True,

@@ -12,36 +12,36 @@ from deadtime.estimation.fit._residuals import Whiteness
 #: What speaks against a fit, by the kernel's name of it, with its sizes.
 WORDS = {
     "colour": (
-        "the residuals are not white even after the noise was fitted (lag-1 autocorrelation "
-        "{0:.2f})"
+        "the residuals are not white even after the "
+        "noise was fitted (lag-1 autocorrelation {0:.2f})"
     ),
-    "lag": "a further lag of {0:.3g} s makes the recording likelier, so the plant lacks a lag",
+    "lag": "with a further lag of {0:.3g} s the recording is more likely, so the plant lacks a lag",
     "lag moves": (
-        "a further lag of {0:.3g} s would change the sum of delay and lag to {1:.3g} s, which "
-        "is outside its interval"
+        "with a further lag of {0:.3g} s, the sum of delay and "
+        "lag would be {1:.3g} s, which is outside its interval"
     ),
     "overshoot": (
-        "a further lag of {0:.3g} s with a zero of {1:.3g} s makes the recording likelier, so "
-        "the plant lacks both"
+        "with a further lag of {0:.3g} s and a zero of {1:.3g} "
+        "s the recording is more likely, so the plant lacks both"
     ),
     "below zero": (
-        "the delay is at zero, and the likelihood still rises towards zero: the plant has too much "
-        "lag, or lacks a zero"
+        "at a delay of zero the likelihood still rises towards "
+        "zero, so the plant has too much lag, or lacks a zero"
     ),
     "change": (
         "the delay is not constant over the window{where}: its standard deviation is {time}"
     ),
     "speed": (
-        "the noise grows with the speed of the output{where}: the time stamps are probably not the "
-        "times of the samples"
+        "the noise grows with the speed of the output{where}, so "
+        "the time stamps are probably not the times of the samples"
     ),
     "restless air": (
-        "the fitted disturbance{where} is too large to be wind: it changes within a row, {0:.2g} "
-        "times the sensor noise, so the plant probably lacks a lag or a zero"
+        "the fitted disturbance{where} is too large to be wind. Within a row it changes "
+        "by {0:.2g} times the sensor noise, so the plant probably lacks a lag or a zero"
     ),
     "moving air": (
-        "the fitted disturbance{where} is larger while the vehicle moves than while it rests: the "
-        "plant probably lacks a lag or a zero"
+        "the fitted disturbance{where} is larger while the vehicle "
+        "moves than at rest, so the plant probably lacks a lag or a zero"
     ),
     "gains": "the recordings contradict one another in {name}: {values}",
     "totals": "the recordings contradict one another in {name}: {times}",

@@ -57,8 +57,8 @@ class ARXScan(OfOne):
 
     name: ClassVar[str] = "arx_scan"
     limits: ClassVar[str] = (
-        "Without fractional=True the delay is found only in whole samples. Sensor noise biases the "
-        "coefficients of the ARX models, especially in a closed loop."
+        "Without fractional=True the delay is a whole number of samples. Sensor noise "
+        "biases the coefficients of the ARX models, especially in a closed loop."
     )
 
     def __post_init__(self) -> None:
@@ -78,9 +78,9 @@ class ARXScan(OfOne):
         if self.fractional:
             if read.remark:
                 raise ValueError(
-                    "fractional=True needs a plant that can be inverted, an Integrator or a "
-                    f"FirstOrder, but the loop has a {type(loop.plant).__name__}: leave "
-                    "fractional out"
+                    "fractional=True needs an Integrator or a "
+                    "FirstOrder, which can be inverted, but the loop has "
+                    f"a {type(loop.plant).__name__}: leave fractional out"
                 )
             gain = float(loop.parameters["gain"])
             response = np.sign(gain) * read.response
@@ -107,9 +107,9 @@ class ARXScan(OfOne):
                 "s"
             ),
             uncalibrated=(
-                "an ARX scan takes the delay with the smallest loss, which has no standard error. "
-                "Sensor noise also biases the coefficients. Use method='output_error' for an "
-                "interval"
+                "an ARX scan chooses the delay with the smallest loss, so "
+                "it has no standard error. Sensor noise also biases the "
+                "coefficients. Use method='output_error' for an interval"
             ),
             details={
                 "samples": samples,
@@ -127,7 +127,7 @@ def _check_response(least: float, none: float, freedom: int, tested: int) -> Non
     ratio = (none - least) / tested / max(least / freedom, 1e-300)
     if float(special.fdtrc(tested, freedom, max(ratio, 0.0))) > F_TEST_LEVEL:
         raise NotIdentifiableError(
-            f"with the command the loss falls only from {none:.3g} to {least:.3g}, no more "
-            "than for noise. Either the output does not respond to this command, or noise "
-            "hides the response. Check columns and units, or excite more"
+            f"with the command, the loss falls only from {none:.3g} to {least:.3g}, as it "
+            "does for noise. Either the output does not respond to this command, or noise "
+            "hides the response. Check columns and units, or use a larger excitation"
         )

@@ -79,9 +79,9 @@ class CommandedModel(ModelOfOne):
         rows = FlightRows.read(data.time, data.output, repeated, self.commands, initial_output)
         if rows.rounding and rows.count < _fewest(self.names):
             raise NotIdentifiableError(
-                f"the output, rounded to {rows.rounding:g}, moves over only {rows.count} such "
-                f"steps, too few to fit {len(self.names)} parameters and an initial output. "
-                "Widen the window, or choose one in which the output moves more"
+                f"the output is rounded to {rows.rounding:g}, and moves over only {rows.count} "
+                f"such steps, too few to fit {len(self.names)} parameters and an initial "
+                "output. Choose a longer window, or one in which the output moves more"
             )
         return rows
 
@@ -160,8 +160,8 @@ def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> Comma
     command = command[: rows.stop]
     if len(data) < _fewest(names):
         raise NotIdentifiableError(
-            f"{len(data)} samples are too few to fit {len(names)} parameters and an initial "
-            "output: widen the window"
+            f"{len(data)} samples are too few to fit {len(names)} "
+            "parameters and an initial output: choose a longer window"
         )
     check_moves(data.output, command)
     integrates = plant_model(loop.plant, ()).integrates
@@ -183,9 +183,9 @@ def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> Comma
         )
     if isinstance(loop.plant, RateLimited) and data.sent is None and commands.are_computed:
         raise NotIdentifiableError(
-            "rows are further apart than the samples of the controller, so commands are "
-            "missing. A plant that limits the rate of its command depends on every command. "
-            "Choose a window without missing rows"
+            "rows are further apart than the samples of the controller, so "
+            "commands are missing. But a plant with a rate limit depends "
+            "on every command. Choose a window without missing rows"
         )
     return CommandedModel(
         recording=data,

@@ -175,10 +175,10 @@ def _why_profile(values: Mapping[str, float], samples: int, numbers: int) -> str
     for slow in ("lag", "time_constant"):
         if slow in values:
             if values[slow] == 0.0:
-                return f"the {slow} was estimated as zero, its bound"
+                return f"the {slow} was estimated as zero, which is its bound"
             return f"delay and {slow.replace('_', ' ')} have similar effects"
     if values.get("delay") == 0.0:
-        return "the delay was estimated as zero, its bound"
+        return "the delay was estimated as zero, which is its bound"
     if samples < FEW * (numbers + 1):
         return f"{samples} samples are few"
     return ""
@@ -207,15 +207,15 @@ def _message(done: str, held: list[str], reason: str, reliable: bool, advice: st
     text = done
     if held:
         text += (
-            f"; the {' and '.join(held)} was estimated as zero, its bound, so its standard "
-            "error is not meaningful"
+            f". The {' and '.join(held)} was estimated as zero, which "
+            "is its bound, so its standard error is not meaningful"
         )
     if reason:
-        text += f"; {reason}, so intervals are those of the profile likelihood"
+        text += f". Because {reason}, intervals are those of the profile likelihood"
     if not reliable:
         text += (
-            f"{COLOURED}, so the model only approximates the vehicle and the intervals use "
-            f"robust standard errors{advice}"
+            f"{COLOURED}, so the model only approximates the vehicle, "
+            f"and the intervals use robust standard errors{advice}"
         )
     return text
 
@@ -264,8 +264,8 @@ class OfOne(Method):
         """The numbers that are asked for; the others are taken as given."""
         if "delay" not in free:
             raise ValueError(
-                f"the {self.name} method determines only the delay, but free={tuple(free)!r} "
-                "does not contain the delay: add 'delay'"
+                f"the {self.name} method estimates only the delay, but "
+                f"free={tuple(free)!r} does not contain the delay: add 'delay'"
             )
         return ("delay",)
 
@@ -311,6 +311,6 @@ class OfOne(Method):
         except ValueError as error:
             values = ", ".join(f"{name} {value:.4g}" for name, value in found.values.items())
             raise NotIdentifiableError(
-                f"the {self.name} method reads {values}, but a loop with these values cannot "
-                f"have been recorded ({error}): check gains, signs and units"
+                f"the {self.name} method reads {values}, but a loop with these values could "
+                f"not have made this recording ({error}): check gains, signs and units"
             ) from None

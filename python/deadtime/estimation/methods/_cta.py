@@ -95,9 +95,9 @@ class CTA(OfOne):
         delay, ends = float(found.point[0]), model.ends("delay")
         if not 1.01 * ends.low < delay < 0.99 * ends.high:
             raise NotIdentifiableError(
-                f"the fit ends at a delay of {delay:.3g} s, a bound of its search. So the "
-                "output is not a response of this loop to this reference. Check columns, "
-                "signs and gains"
+                f"the search ends at its bound, a delay of {delay:.3g} "
+                "s. So the output is not a response of this loop to "
+                "this reference. Check columns, signs and gains"
             )
         count = len(names)
         every = list(range(len(model.labels)))
@@ -109,8 +109,8 @@ class CTA(OfOne):
             cov,
             model.start_of(found.point),
             message=(
-                f"least squares over {', '.join(names)}, the delay line in {self.intervals} "
-                "intervals"
+                f"least squares over {', '.join(names)}, with "
+                f"the delay line in {self.intervals} intervals"
             ),
             uncalibrated=(
                 "the cta method approximates the delay by a polynomial of degree "

@@ -57,15 +57,15 @@ class Decay(OfOne):
 
     name: ClassVar[str] = "decay"
     limits: ClassVar[str] = (
-        "The method assumes that the gain is known and the tail is one exponential. A wrong "
-        "gain, a lag or other modes therefore bias the delay."
+        "The method assumes that the gain is known and that the tail is one "
+        "exponential. So a wrong gain, a lag or other modes bias the delay."
     )
 
     def __post_init__(self) -> None:
         if positive("tail", self.tail) >= 1.0:
             raise ValueError(
-                f"tail={self.tail}: the tail begins when this share of the step remains, so "
-                "give a number below 1"
+                f"tail={self.tail}: give the share of the step "
+                "that remains where the tail begins, below 1"
             )
 
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
@@ -79,45 +79,45 @@ class Decay(OfOne):
         )
         if extremes:
             raise NotIdentifiableError(
-                "the output overshoots, so the rightmost roots are complex and the tail is no "
-                "exponential: use method='decrement', 'overshoot' or 'waveform'"
+                "the output overshoots, so the rightmost roots are complex, and the tail "
+                "is not an exponential. Use method='decrement', 'overshoot' or 'waveform'"
             )
         rate, error, samples = _rate(reading, _begin(reading, loop, self.tail))
         lag = loop.parameters["lag"]
 
         if lag * rate >= 1.0:
             raise NotIdentifiableError(
-                f"the tail decays at a rate of {rate:.4g} 1/s, faster than possible with a "
-                f"lag of {lag:g} s, so the true lag is smaller: check the lag"
+                f"the tail decays at {rate:.4g} 1/s, faster than is possible with "
+                f"a lag of {lag:g} s. So the true lag is smaller: check the lag"
             )
         delay, slope = delay_of_rate(rate, stiffness, lag, loop.sample_time)
         stderr = abs(slope) * error
         if delay < 0.0:
             raise NotIdentifiableError(
-                f"the tail decays at a rate of {rate:.4g} 1/s, slower than without any delay "
-                f"at K = {stiffness:.4g} 1/s. Either the gain is smaller than given, or the "
-                "tail begins too late. Check the gains"
+                f"the tail decays at {rate:.4g} 1/s, slower than without any "
+                f"delay at K = {stiffness:.4g} 1/s. Either the gain is smaller "
+                "than given, or the tail begins too late. Check the gains"
             )
         held = 0.5 * (loop.sample_time or 0.0)
         if rate * (delay + lag + held) >= 1.0:
             raise NotIdentifiableError(
-                f"the tail decays at a rate of {rate:.4g} 1/s, but at most e·K = "
-                f"{math.e * stiffness:.4g} 1/s is possible without overshoot. So K·Td is near "
-                "or above 1/e. Use method='decrement' or 'waveform'"
+                f"the tail decays at {rate:.4g} 1/s, but without overshoot at "
+                f"most e·K = {math.e * stiffness:.4g} 1/s is possible. So K·Td "
+                "is near or above 1/e. Use method='decrement' or 'waveform'"
             )
         return Read(
             {"delay": delay},
             stderr,
             reading.start,
             message=(
-                f"{samples} samples of the tail decay with {rate:.4g} ± {error:.2g} 1/s: assumes "
+                f"{samples} samples of the tail decay at {rate:.4g} ± {error:.2g} 1/s, assuming "
                 f"a gain of {loop.parameters['gain']:g} and an output that ends at the reference"
             ),
             uncalibrated=(
-                "the decay method assumes the given gain and an exponential tail. Noise alone "
-                f"gives the delay a standard error of {stderr:.2g} s. A gain error of 1 % shifts "
-                f"it by {0.01 / rate:.2g} s, and other modes in the tail shift it too. Use "
-                "method='waveform' for an interval"
+                "the decay method assumes the given gain and an exponential tail. Noise "
+                f"alone gives the delay a standard error of {stderr:.2g} s. A gain error "
+                f"of 1 % shifts the delay by {0.01 / rate:.2g} s, and other modes in the "
+                "tail also shift the delay. Use method='waveform' for an interval"
             ),
             details={"rate": rate, "rate_error": error, "tail_samples": samples},
         )
@@ -146,8 +146,8 @@ def _rate(reading: StepReading, begin: float) -> tuple[float, float, int]:
     time, left = reading.since[rows], 1.0 - reading.travelled[rows]
     if time.size < FEWEST:
         raise NotIdentifiableError(
-            f"the tail has {time.size} samples, but {FEWEST} are needed: sample faster, "
-            "record longer, or begin the tail earlier with a larger `tail`"
+            f"the tail has {time.size} samples, but the method needs {FEWEST}: sample "
+            "faster, record longer, or begin the tail earlier with a larger `tail`"
         )
     time = time - time[0]
     clear = left > max(CLEARANCE * reading.noise, 0.2 * float(left[0]))
@@ -157,7 +157,7 @@ def _rate(reading: StepReading, begin: float) -> tuple[float, float, int]:
     height, rate, error = tail_rate(time, left, max(guess, 1e-3))
     if height <= 0.0 or rate <= 0.0 or rate < CLEARANCE * error:
         raise NotIdentifiableError(
-            f"the tail decays at a rate of {rate:.3g} ± {error:.2g} 1/s, which may be zero. "
+            f"the tail decays at {rate:.3g} ± {error:.2g} 1/s, so the rate may be zero. "
             "Begin the tail earlier with a larger `tail`, or use method='waveform'"
         )
     return rate, error, int(time.size)

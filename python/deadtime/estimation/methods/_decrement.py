@@ -42,9 +42,9 @@ class Decrement(OfOne):
 
     name: ClassVar[str] = "decrement"
     limits: ClassVar[str] = (
-        "The method assumes that the peaks are those of one decaying oscillation. Other modes "
-        "in the first peaks bias the delay, and so does noise to which the controller "
-        "responds."
+        "The method assumes that the peaks belong to one decaying "
+        "oscillation. Other modes in the first peaks bias the delay. "
+        "Noise to which the controller responds also biases the delay."
     )
 
     def names(self, free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
@@ -52,8 +52,8 @@ class Decrement(OfOne):
         names = delay_and(free, loop, "decrement")
         if "lag" in names:
             raise ValueError(
-                "the decrement method reads two numbers, damping and frequency, to find delay "
-                "and gain: fix the lag, or use method='waveform'"
+                "the decrement method finds delay and gain from two numbers, damping and "
+                "frequency, so it cannot fit a lag: fix the lag, or use method='waveform'"
             )
         return names
 
@@ -86,8 +86,8 @@ class Decrement(OfOne):
             own = np.array([[cov[0, 0] - share * cov[0, 1]]])
         if values["delay"] <= 0.0:
             raise NotIdentifiableError(
-                f"the peaks decay with a damping ratio of {pair[0] / math.hypot(*pair):.3g}, "
-                f"more than possible for any delay with K = {stiffness:g} 1/s: check the gains"
+                f"the damping ratio of the peaks is {pair[0] / math.hypot(*pair):.3g}, which "
+                f"is more than any delay gives with K = {stiffness:g} 1/s: check the gains"
             )
         return Read(
             values,
@@ -98,10 +98,10 @@ class Decrement(OfOne):
                 f"{pair[1]:.3f} rad/s{'' if 'gain' in names else ', with the given gain'}"
             ),
             uncalibrated=(
-                "the decrement method assumes one decaying oscillation. Noise alone gives the "
-                f"delay a standard error of {math.sqrt(own[0, 0]):.2g} s. Other modes in the "
-                "first peaks bias the delay too, and so does noise to which the controller "
-                "responds. Use method='waveform' for an interval"
+                "the decrement method assumes one decaying oscillation. Noise alone "
+                f"gives the delay a standard error of {math.sqrt(own[0, 0]):.2g} s. "
+                "Other modes in the first peaks and noise in the command bias the "
+                "delay too. Use method='waveform' for an interval"
             ),
             details={
                 "damping_ratio": float(pair[0] / math.hypot(*pair)),
@@ -122,16 +122,16 @@ def _linear(extremes: list[Extreme], reading: StepReading, loop: ControlLoop) ->
         return linear
     if not extremes:
         raise NotIdentifiableError(
-            "there is no overshoot above the noise, and without an oscillation no peaks "
-            "determine the delay. Raise Kp, or use method='decay' or 'waveform'"
+            "no overshoot is larger than the noise, and without an oscillation there "
+            "are no peaks to read. Raise Kp, or use method='decay' or 'waveform'"
         )
     if len(extremes) >= 2:
         raise NotIdentifiableError(
             f"the command is at its limit of {loop.limit:g} at {len(extremes) - len(linear)} "
-            f"of {len(extremes)} extremes, so the limit determines their decay, not the "
+            f"of {len(extremes)} extremes, so the decay depends on the limit, not on the "
             "roots. Use a smaller step, or method='waveform'"
         )
     raise NotIdentifiableError(
-        f"only one extreme ({100 * extremes[0].height:.2g} % of the step) is above the noise, "
-        "but a decrement needs two. Raise Kp, record longer, or use method='overshoot'"
+        f"only one extreme ({100 * extremes[0].height:.2g} % of the step) is larger than the "
+        "noise, but a decrement needs two. Raise Kp, record longer, or use method='overshoot'"
     )

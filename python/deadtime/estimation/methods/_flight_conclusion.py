@@ -160,17 +160,17 @@ def _message(
 ) -> str:
     text = f"{done}; {noise}"
     if left_out:
-        text += f"; {left_out} rows left out as outliers"
+        text += f"; {left_out} rows were left out as outliers"
     for what, size in scatter.items():
         text += (
             f"; the time stamps of the {what.removeprefix('scatter_of_')} have random errors with "
             f"a standard deviation of {size:.2g} s"
         )
     if held:
-        text += f"; the {' and '.join(held)} was estimated as zero, its bound"
+        text += f"; the {' and '.join(held)} was estimated as zero, which is its bound"
     if adequacy.reasons:
         return f"{text}{REASONS}{'; '.join(adequacy.reasons)}{advice(names, run.loop)}"
-    return f"{text}; {unseen_in_words(unseen)} have been seen"
+    return f"{text}; {unseen_in_words(unseen)} have been found"
 
 
 def rounding_is_all(fit: FlightFit) -> bool:
@@ -232,7 +232,7 @@ def read_as_intervals(
         crb=CramerRaoBound(model.labels, noise[0], plain),
         residuals=runs[0].residuals,
         noise=noise[0],
-        message=f"{message}; each row is read as the interval of its rounding",
+        message=f"{message}; each row is an interval as wide as its rounding",
         details={**estimate.details, "initial_output": parts[0].start_of(peak.point)},
         others=runs[1:],
         _profile=Profile(

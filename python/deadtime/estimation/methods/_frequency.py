@@ -108,7 +108,7 @@ class Frequency(OfOne):
         recording, loop, window, *_ = run
         integrator_of(loop, "frequency")
         data, rows = recording.window(*window), recording.rows(*window)
-        check_even(data, EVEN, "a DFT needs evenly spaced ones; use method='output_error'")
+        check_even(data, EVEN, "a DFT needs evenly spaced samples. Use method='output_error'")
         command, source = commands_over_samples(recording, loop)
         commands = recording.time[: rows.stop], command[: rows.stop]
         check_moves(data.output, command[rows])
@@ -205,8 +205,8 @@ class _Lines(ModelOfOne):
         costs, _, found = self.problem.scan(grid, guess, lag, 0.0)
         if int(np.argmin(costs)) == count:
             raise NotIdentifiableError(
-                f"the fit ends at a delay of {grid[-1]:.3g} s, the longest of its search, so "
-                "the output is not a response to this command. Check columns and units"
+                f"the search ends at its longest delay, {grid[-1]:.3g} s, so the "
+                "output is not a response to this command. Check columns and units"
             )
         return found
 
@@ -221,8 +221,8 @@ def _record_lines(asked: _Asked, commands: tuple[Array, Array], highest: float) 
     real = 2 * int(kept.sum()) - int(nyquist)
     if real < 2 * (len(names) + 1):
         raise NotIdentifiableError(
-            f"{int(kept.sum())} lines up to {highest:g} Hz are too few to fit {len(names)} "
-            "parameters: widen the window, or give a higher `highest`"
+            f"{int(kept.sum())} lines of the spectrum up to {highest:g} Hz are too few to "
+            f"fit {len(names)} parameters: choose a longer window, or give a higher `highest`"
         )
     every = int(kept.sum()) == size // 2
     made = partial(
@@ -244,8 +244,8 @@ def _periodic_lines(asked: _Asked, command: Array, periods: Periods) -> _Lines:
     freedom = 2 * periods.lines.size - len(names)
     if freedom < 2:
         raise NotIdentifiableError(
-            f"{periods.lines.size} excited lines are too few to fit {len(names)} parameters: "
-            "excite more frequencies"
+            f"{periods.lines.size} excited lines of the spectrum are too "
+            f"few to fit {len(names)} parameters: excite more frequencies"
         )
     # The inverse of a variance estimated with f degrees of freedom is too large by f/(f - 1) on
     # average.

@@ -74,9 +74,9 @@ class GCC(OfOne):
         read = read_input_output(simulated, "gcc")
         if int(np.count_nonzero(np.diff(read.command))) < 2:
             raise NotIdentifiableError(
-                "the command changes at most once in the window, for example because it is at "
-                "its limit, so its correlation has no peak. Use a smaller step, or "
-                "method='output_error'"
+                "the command changes at most once in the window, "
+                "perhaps because of its limit, so its correlation has "
+                "no peak. Use a smaller step, or method='output_error'"
             )
         p_value = feedback_p_value(data)
         feedback = p_value < FEEDBACK
@@ -120,22 +120,22 @@ def _explained(read: InputOutput, shift: int) -> float:
     needed = -float(special.ndtri(LEVEL)) * np.sqrt(max(spread, 0.25) / size)
     if abs(coefficient) < needed:
         raise NotIdentifiableError(
-            f"command and response are correlated by at most {abs(coefficient):.2g}, but "
-            f"unrelated signals reach up to {needed:.2g}. Either the output does not respond "
-            "to this command, or noise hides the response. Check columns and units, or excite "
-            "more"
+            "the correlation of command and response is at most "
+            f"{abs(coefficient):.2g}, but unrelated signals reach {needed:.2g}. "
+            "Either the output does not respond to this command, or noise hides "
+            "the response. Check columns and units, or use a larger excitation"
         )
     return abs(coefficient)
 
 
 def _message(weighting: Weighting, share: float, feedback: bool, read: InputOutput) -> str:
     text = (
-        f"peak of the cross-correlation (weighting {weighting!r}), command and response correlated "
-        f"by {share:.2f}"
+        f"peak of the cross-correlation (weighting {weighting!r}), "
+        f"where command and response have a correlation of {share:.2f}"
     )
     if feedback:
         text += (
-            "; the command depends on the output, so both contain the same noise, which "
-            "biases the peak. Use this delay only as an initial value"
+            ". The command depends on the output, so both contain the same noise, "
+            "which biases the peak. Use this delay only as an initial value"
         )
     return text + read.remark

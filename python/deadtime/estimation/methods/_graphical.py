@@ -90,7 +90,7 @@ class Graphical(OfOne):
             delay, stderr = _tangent(reading, moved, loop.sample_time)
         if not delay > LEAST * float(reading.since[-1]):
             raise NotIdentifiableError(
-                f"the line meets the initial output {-delay:.3g} s before the step. Its "
+                f"the line meets the initial output {-delay:.3g} s before the step. Either its "
                 "samples are too few or too noisy, or there is no delay. Use method='waveform'"
             )
         return Read(
@@ -123,8 +123,8 @@ def _first_movement(reading: StepReading) -> int:
         moved = int(np.flatnonzero(reading.travelled[:half] <= least)[-1]) + 1 if half else 0
     if moved == 0 or moved >= reading.travelled.size:
         raise NotIdentifiableError(
-            "the output either moves within the first sample after the step at "
-            f"{reading.step.time:g} s, or does not move, so no delay can be read"
+            f"the output moves within the first sample after the step at {reading.step.time:g} "
+            "s, or not at all, so no delay can be read. Use method='waveform'"
         )
     return moved
 
@@ -133,8 +133,8 @@ def _two_point(reading: StepReading, low: float, high: float) -> float:
     """Time after the step, s, at which the line through two shares meets the initial output."""
     if low < CLEARANCE * reading.noise:
         raise NotIdentifiableError(
-            f"a share of {low:g} of the step is too near to the noise, {reading.noise:.2g} of "
-            "the step. Give larger `shares`, or a larger step"
+            f"the smaller of `shares`, {low:g}, is too close to the noise, which is "
+            f"{reading.noise:.2g} of the step. Give larger `shares`, or a larger step"
         )
     times = []
     for share in (low, high):
@@ -152,7 +152,7 @@ def _tangent(reading: StepReading, moved: int, held: float | None) -> tuple[floa
     if few is not None:
         count, begin, until = few
         raise NotIdentifiableError(
-            f"the straight part, from {begin:.3g} to {until:.3g} s after the step, has "
+            f"the straight part, from {begin:.3g} to {until:.3g} s after the step, has only "
             f"{count} samples: sample faster than twice a delay, or use method='waveform'"
         )
     if found is None:

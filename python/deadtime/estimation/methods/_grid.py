@@ -100,9 +100,9 @@ class Grid(OfOne):
         )
         if int(np.argmin(costs)) == grid.size - 1:
             raise NotIdentifiableError(
-                f"the cost falls up to a delay of {grid[-1]:g} s, the longest of the grid. So "
-                "the output is not a response of this loop to this reference. Check columns, "
-                "signs, units and gains, or give other `delays`"
+                f"the cost falls up to the longest delay of the grid, {grid[-1]:g} "
+                "s. So the output is not a response of this loop to this reference. "
+                "Check columns, signs, units and gains, or give other `delays`"
             )
         point, residuals = found.point, -found.misfit
         check_ends(labels, point, model.low, model.high)
@@ -123,10 +123,10 @@ class Grid(OfOne):
             start=model.start_of(point),
             message=_message(names, grid, white),
             uncalibrated=(
-                "the grid method ignores that the controller responds to the noise. The "
-                f"curvature of the cost gives {low:.4g} to {high:.4g} s (95 %), which is "
-                "valid only without this response. Use method='output_error' or 'waveform' "
-                "for an interval"
+                "the grid method ignores that the controller responds "
+                "to the noise. Without this response, the delay would "
+                f"be {low:.4g} to {high:.4g} s (95 %). Use "
+                "method='output_error' or 'waveform' for an interval"
             ),
             details={
                 "delays": grid.tolist(),
@@ -146,8 +146,8 @@ def _checked(delays: ArrayLike) -> Array:
     grid = increasing("delays", delays)
     if grid.size < 3 or grid[0] < 0.0:
         raise ValueError(
-            f"delays: {grid.size} delays from {grid[0] if grid.size else math.nan:g} s are "
-            "given; give three or more, none below zero"
+            f"delays contains {grid.size} delays from {grid[0] if grid.size else math.nan:g} "
+            "s on: give three or more, all of zero or more"
         )
     return grid
 
@@ -156,10 +156,10 @@ def _message(names: tuple[str, ...], grid: Array, reliable: bool) -> str:
     others = [name for name in names if name != "delay"]
     text = f"least cost over {grid.size} delays from {grid[0]:.3g} to {grid[-1]:.3g} s"
     if others:
-        text += f", {' and '.join(others)} at their best values for each"
+        text += f", with {' and '.join(others)} at their best values for each delay"
     if not reliable:
         text += (
-            f"{COLOURED}, so the loop only approximates the vehicle and "
-            "the standard errors are robust ones"
+            f"{COLOURED}, so the loop only approximates the "
+            "vehicle, and the standard errors are robust"
         )
     return text

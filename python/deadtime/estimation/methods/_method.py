@@ -39,7 +39,7 @@ def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> l
     """Pair recordings with loops and windows; a single loop or window applies to all."""
     recordings = list(recording) if isinstance(recording, (list, tuple)) else [recording]
     if not recordings:
-        raise ValueError("no recording was given: give one, or a list of them")
+        raise ValueError("no recording was given: give a recording, or a list of recordings")
     number = len(recordings)
     loops = list(loop) if isinstance(loop, (list, tuple)) else [loop] * number
     windows: list[Any] = [window] * number
@@ -53,17 +53,17 @@ def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> l
     runs = []
     for index, (one, its_loop, ends) in enumerate(zip(recordings, loops, windows, strict=True)):
         if not isinstance(one, Recording):
-            raise TypeError(f"recording[{index}] must be a Recording, got {type(one).__name__}")
+            raise TypeError(f"recording[{index}] must be a Recording, not {type(one).__name__}")
         if not isinstance(its_loop, ControlLoop):
-            raise TypeError(f"loop[{index}] must be a ControlLoop, got {type(its_loop).__name__}")
+            raise TypeError(f"loop[{index}] must be a ControlLoop, not {type(its_loop).__name__}")
         open_interval("window", ends)
         low, high = (None, None) if ends is None else ends
         runs.append(Run(one.complete(), its_loop, (low, high)))
     plants = {type(run.loop.plant).__name__ for run in runs}
     if len(plants) > 1:
         raise ValueError(
-            f"the loops have different plants ({', '.join(sorted(plants))}), but recordings "
-            "that are fitted together must be of one vehicle"
+            f"the loops have different plants ({', '.join(sorted(plants))}), "
+            "but recordings that are fitted together must come from one vehicle"
         )
     return runs
 

@@ -118,8 +118,8 @@ class OutputError(Method):
             plant_model(r.loop.plant, ()).integrates for r in runs
         ):
             raise ValueError(
-                "air='vehicle' needs a plant that integrates the effect of its motors, such "
-                "as Integrator: use air='command'"
+                "air='vehicle' needs a plant such as Integrator, which "
+                "integrates the effect of its motors: use air='command'"
             )
         assumed = Assumed(
             self.initial_output, output_filter=known, air=self.air, intervals=self.intervals
@@ -145,7 +145,7 @@ def estimate_from_commands(
     # Each has as many numbers, and neither is more usual.
     if not _criterion(even) < _criterion(stamped):
         return stamped
-    text = "the rows are taken as evenly spaced, which is likelier than the times of their stamps"
+    text = "the rows are assumed to be evenly spaced, which is more likely than their time stamps"
     return replace(
         even, message=f"{even.message}; {text}", details={**even.details, "times": "even"}
     )
@@ -305,8 +305,8 @@ def _likeliest(begun: _Begun) -> _Likeliest:
         fit, numbers = fit.with_numbers(given, list(begun.numbers.items()))
         if numbers is None:
             raise NotIdentifiableError(
-                f"this recording cannot separate the {' and '.join(begun.numbers)} from the "
-                "other fitted parameters: fix one of them, or record larger steps"
+                f"this recording cannot separate the effect of {' and '.join(begun.numbers)} "
+                "from other fitted parameters: fix one of them, or record larger steps"
             )
         values = dict(numbers.values)
         fitted = [run._replace(loop=run.loop.replace(**values)) for run in fitted]
@@ -315,8 +315,8 @@ def _likeliest(begun: _Begun) -> _Likeliest:
         fit, unclear, covariance = fit.between_rows(commands, not begun.numbers)
     profile = profile_for(fit, begun.assumed.intervals, covariance, numbers)
     doubts = (
-        "the reference changes between rows that are further apart than samples, at times that "
-        "the recording does not show",
+        "rows are further apart than samples, and the recording does "
+        "not show at which times between rows the reference changes",
     )
     return _Likeliest(profile, doubts * unclear, fitted)
 
@@ -326,9 +326,9 @@ def _check_delay(begun: _Begun, profile: FlightProfile) -> None:
     longest = min(LONGEST_DELAY * one.span for one in begun.models)
     if "delay" in begun.names.free and profile.fit.numbers.delay >= longest * (1.0 - 1e-3):
         raise NotIdentifiableError(
-            f"the fit ends at a delay of {longest:g} s, {LONGEST_DELAY:g} of the window, so "
-            "the output is not a response to this command. Check columns and units, or choose "
-            "a longer window"
+            f"the search ends at its longest delay, {longest:g} s, which is "
+            f"{LONGEST_DELAY:g} of the window. So the output is not a response "
+            "to this command. Check columns and units, or choose a longer window"
         )
     if not gain_is_certain(profile):
         check_fit(*begun.plain, begun.fitted)
@@ -355,7 +355,7 @@ def _concluded(begun: _Begun, found: _Likeliest, adequacy: Adequacy) -> DelayEst
     profile, message = found.profile, f"maximum likelihood {begun.message}"
     if adequacy.coloured:
         profile = profile.coloured()
-        message += ", intervals widened for residuals that are coloured at rest, too"
+        message += ", with wider intervals because the residuals are coloured also at rest"
     estimate = concluded_flight(
         begun.method,
         begun.names.linear,
@@ -406,13 +406,13 @@ def _check_others(names: Sequence[str], known: Mapping[str, float]) -> None:
     """Refuse numbers that cannot be searched around the rest."""
     if len(names) > MOST_NUMBERS:
         raise ValueError(
-            f"{', '.join(names)} are {len(names)} parameters besides gain, delay, lags and "
-            f"zero: fit at most {MOST_NUMBERS} of them"
+            f"besides gain, delay, lags and zero, the plant has {len(names)} free "
+            f"parameters ({', '.join(names)}): fit at most {MOST_NUMBERS} of them"
         )
     for name in names:
         if known[name] == 0.0:
             raise ValueError(
-                f"{name}=0: give an initial value other than zero, with the sign of this parameter"
+                f"{name}=0: give an initial value other than zero, with the right sign"
             )
 
 

@@ -70,9 +70,9 @@ def damping_ratio(overshoot: float) -> float:
     """
     if not 0.0 < overshoot < 1.0:
         raise NotIdentifiableError(
-            f"an overshoot of {100 * overshoot:.4g} % has no damping ratio: equation (5) "
-            "needs an overshoot between 0 and 100 %. Use map='exact' above 100 %, the "
-            "waveform method below 0 %"
+            f"an overshoot of {100 * overshoot:.4g} % has no damping "
+            "ratio, because equation (5) is valid only from 0 to 100 %. "
+            "Use map='exact' above 100 %, or the waveform method below 0 %"
         )
     log = math.log(overshoot)
     return -log / math.hypot(math.pi, log)
@@ -94,8 +94,8 @@ def exact_x(overshoot: float) -> float:
     x = x_of_overshoot(overshoot)
     if x is None:
         raise NotIdentifiableError(
-            f"an overshoot of {100 * overshoot:.3g} % is too small, because K·Td is at its "
-            f"limit 1/e = {math.exp(-1.0):.4f}: use the waveform method"
+            f"at an overshoot of {100 * overshoot:.3g} %, K·Td is at its limit 1/e = "
+            f"{math.exp(-1.0):.4f}, so the overshoot is too small. Use the waveform method"
         )
     return x
 
@@ -120,8 +120,8 @@ class Overshoot(OfOne):
 
     name: ClassVar[str] = "overshoot"
     limits: ClassVar[str] = (
-        "The method reads one peak and assumes that the gain is known. A vehicle with less "
-        "gain overshoots less, so its estimated delay is too short."
+        "The method reads one peak, and assumes that the gain is known. A vehicle "
+        "with a smaller gain overshoots less, so its estimated delay is too short."
     )
 
     def __post_init__(self) -> None:
@@ -158,14 +158,14 @@ class Overshoot(OfOne):
             stderr,
             reading.start,
             message=(
-                f"{100 * overshoot:.2f} % overshoot, map {self.map!r}: assumes a gain of "
-                f"{loop.parameters['gain']:g} and no lag"
+                f"{100 * overshoot:.2f} % overshoot, map {self.map!r}, "
+                f"assuming a gain of {loop.parameters['gain']:g} and no lag"
             ),
             uncalibrated=(
-                "the overshoot method reads one peak. Noise alone gives the delay a standard "
-                f"error of {stderr:.2g} s. The largest of noisy samples is too high on "
-                "average, and a wrong gain, a lag or the hold bias the delay. Use "
-                "method='waveform' for an interval"
+                "the overshoot method reads one peak. Noise alone gives the delay "
+                f"a standard error of {stderr:.2g} s. With noise, the largest "
+                "sample is too high on average. A wrong gain, a lag or the hold "
+                "also bias the delay. Use method='waveform' for an interval"
             ),
             details=details,
         )
@@ -181,10 +181,10 @@ def _overshoot(reading: StepReading) -> tuple[float, float]:
     if value - settled <= max(CLEARANCE * reading.noise, 1e-9):
         beyond = max(0.0, value - settled)
         raise NotIdentifiableError(
-            f"there is no overshoot: the output exceeds its final value by {100 * beyond:.2g} "
-            f"% of the step, and noise alone by {100 * CLEARANCE * reading.noise:.2g} %. "
-            "Kp·Td is below or near 1/e, and then the overshoot does not determine the delay. "
-            "Raise Kp, or use method='waveform'"
+            "there is no overshoot: the output exceeds its final value by "
+            f"{100 * beyond:.2g} % of the step, and noise alone by "
+            f"{100 * CLEARANCE * reading.noise:.2g} %. Kp·Td is below or near 1/e, where "
+            "the overshoot does not determine the delay. Raise Kp, or use method='waveform'"
         )
     return value, reading.noise * math.sqrt(1.0 + 1.0 / reading.start_samples)
 
@@ -207,16 +207,16 @@ def _saturated_delay(
         low *= 0.7
     else:
         raise NotIdentifiableError(
-            "even without a delay the loop would overshoot by more than "
-            f"{100 * overshoot:.3g} %, because of its hold: check the gains and the sample "
-            "time"
+            "because of its hold, the loop would overshoot by "
+            f"more than {100 * overshoot:.3g} % even without a "
+            "delay: check the gains and the sample time"
         )
     span = float(simulated.recording.time[-1] - reading.step.time)
     while excess(high) < 0.0:
         high *= 1.3
         if high > span:
             raise NotIdentifiableError(
-                f"no delay up to {span:g} s gives an overshoot of {100 * overshoot:.3g} % within "
-                "the limit: check the limit and the gains"
+                f"with this limit of the command, no delay up to {span:g} s gives an "
+                f"overshoot of {100 * overshoot:.3g} %: check the limit and the gains"
             )
     return float(brentq(excess, low, high, xtol=1e-12, rtol=1e-12))

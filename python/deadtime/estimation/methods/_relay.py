@@ -72,8 +72,8 @@ class Relay(OfOne):
 
     name: ClassVar[str] = "relay"
     limits: ClassVar[str] = (
-        "The method counts a lag of the plant as delay. It assumes that the slopes of the "
-        "cycle are straight, so a drift biases the delay."
+        "The method counts a lag of the plant as delay. It also assumes that "
+        "the slopes of the cycle are straight, so a drift biases the delay."
     )
 
     def __post_init__(self) -> None:
@@ -97,8 +97,8 @@ class Relay(OfOne):
         delay = mean - cycle_delay_by_lag(plant.lag, half)
         if delay <= 0.0:
             raise NotIdentifiableError(
-                f"lag and hold explain a quarter of the period, {0.5 * half:.3g} s. Either "
-                f"the lag is shorter than the given {plant.lag:g} s, or there is no delay"
+                f"lag and hold explain a quarter of the period, {0.5 * half:.3g} s. "
+                f"So the lag is shorter than {plant.lag:g} s, or there is no delay"
             )
         rows, path, output = _path(data, switches, delay, plant.lag)
         first, last = data.time[rows[[0, -1]]]
@@ -142,9 +142,9 @@ def _relay(data: Recording, amplitude: float | None) -> tuple[Array, float | Non
     at = np.abs(np.abs(data.command) - size) <= 0.01 * size
     if size == 0.0 or float(np.mean(at)) < AT_VALUES:
         raise NotIdentifiableError(
-            f"the command is at ±{size:.3g} in only {100 * float(np.mean(at)):.0f} % of the "
-            "samples, so it is not the command of a relay. Use method='output_error', or run "
-            "Experiment.relay"
+            "a relay command has two values, but this command is at "
+            f"±{size:.3g} in only {100 * float(np.mean(at)):.0f} % of the "
+            "samples. Use method='output_error', or run Experiment.relay"
         )
     return np.where(data.command >= 0.0, 1.0, -1.0), size
 
@@ -152,25 +152,25 @@ def _relay(data: Recording, amplitude: float | None) -> tuple[Array, float | Non
 def _check_cycle(crossings: Array, error: Array, time: Array) -> None:
     """Refuse what is no sustained oscillation around the reference."""
     if float(np.ptp(error)) == 0.0:
-        raise NotIdentifiableError("the output does not move: there is no limit cycle")
+        raise NotIdentifiableError("the output does not move, so there is no limit cycle")
     if crossings.size < FEWEST + 1:
         raise NotIdentifiableError(
-            f"the output crosses the reference {crossings.size} times after the first "
-            f"{LEFT_OUT}, but {FEWEST + 1} times are needed. Either there is no limit cycle, "
-            "or the window is too short"
+            f"after the first {LEFT_OUT} crossings, the output crosses the "
+            f"reference {crossings.size} times, but {FEWEST + 1} times are "
+            "needed. Either there is no limit cycle, or the window is too short"
         )
     halves = np.diff(crossings)
     if float(np.std(halves)) > UNEVEN * float(np.mean(halves)):
         raise NotIdentifiableError(
             "the time between crossings of the reference varies from "
-            f"{float(halves.min()):.3g} to {float(halves.max()):.3g} s. This is noise or a "
-            "changing reference, not a limit cycle"
+            f"{float(halves.min()):.3g} to {float(halves.max()):.3g} s. "
+            "So this is noise or a changing reference, not a limit cycle"
         )
     peaks = _peaks(time, error, crossings)
     if peaks[-1] < SHRINKING * peaks[0]:
         raise NotIdentifiableError(
-            f"the oscillation decays from {peaks[0]:.3g} to {peaks[-1]:.3g}, so it is not "
-            "sustained by a relay: use method='decrement' or 'waveform'"
+            f"the oscillation decays from {peaks[0]:.3g} to {peaks[-1]:.3g}, so no "
+            "relay sustains this oscillation. Use method='decrement' or 'waveform'"
         )
 
 
@@ -190,9 +190,9 @@ def _switches(time: Array, signs: Array, crossings: Array, sampled: bool) -> Arr
     for count, crossing in zip(counts, crossings, strict=False):
         if count % 2 == 0:
             raise NotIdentifiableError(
-                f"the command switches {count} times around the crossing at {crossing:.3g} s. "
-                "Either noise hides the limit cycle, or the command is not that of a relay. "
-                "Use a larger relay"
+                f"the command switches {count} times around the crossing at "
+                f"{crossing:.3g} s. Either noise hides the limit cycle, or "
+                "the command does not come from a relay. Use a larger relay"
             )
     return np.array(times)
 

@@ -179,7 +179,7 @@ class Identifiability(ReadOnlyArrays, Pictured):
             f"{self.experiment.name}: {len(self.experiment)} samples, "
             f"{self.experiment.time[0]:g} to {self.experiment.time[-1]:g} s, {self.noise}; "
             f"free: {', '.join(self.bound.free)}",
-            "  assumed values with their smallest standard errors",
+            "  assumed values, and the smallest standard errors that are possible",
             f"  {'':<20}{'command logged':>20}{'reference only':>20}",
         ]
         known = with_sums(self.loop)
@@ -375,8 +375,8 @@ def _checked_start(initial_output: float | None) -> None:
     """Refuse a known output at the start that is not that of an experiment."""
     if initial_output is not None and finite("initial_output", initial_output) != 0.0:
         raise ValueError(
-            f"initial_output={initial_output}: an experiment starts at rest at zero. Give 0.0 "
-            "if the start is known, or None if the start is fitted"
+            f"initial_output={initial_output}: an experiment starts at rest, with an output "
+            "of zero. Give 0.0 if the start is known, or None if the start is fitted"
         )
 
 
@@ -387,8 +387,8 @@ def _noise_with_covariance(noise: float | FlightNoise) -> FlightNoise:
         return noise
     if isinstance(noise, NoiseModel):
         raise TypeError(
-            f"noise is a {type(noise).__name__}, whose covariance is not known: give a standard "
-            "deviation or a FlightNoise"
+            f"noise is a {type(noise).__name__}, so its covariance is "
+            "not known: give a standard deviation or a FlightNoise"
         )
     return FlightNoise(positive("noise", noise))
 
@@ -399,23 +399,23 @@ def _check_excitation(loop: ControlLoop, recording: Recording, names: tuple[str,
     assert command is not None
     if not command.any():
         raise NotIdentifiableError(
-            "the command is 0 throughout, so the experiment does not excite the loop"
+            "the command is 0 throughout, so this experiment does not excite the loop"
         )
     if float(np.ptp(recording.output)) == 0.0:
         raise NotIdentifiableError(
-            "the output does not move before the end of the experiment at "
-            f"{recording.time[-1]:g} s: make the experiment longer than the delay of "
-            f"{loop.delay:g} s"
+            "until the end of the experiment at "
+            f"{recording.time[-1]:g} s the output does not move: make "
+            f"the experiment longer than the delay of {loop.delay:g} s"
         )
     if loop.is_sampled and float(np.ptp(command)) == 0.0:
         raise NotIdentifiableError(
-            f"the command is at its limit throughout, {command[0]:g}: use a smaller step, or "
-            "a longer experiment"
+            f"the command stays at its limit, {command[0]:g}: "
+            "use a smaller step, or a longer experiment"
         )
     slow = [name for name in SLOW if name in names]
     if slow and "delay" in names and loop.parameters[slow[0]] == 0.0:
         raise NotIdentifiableError(
-            f"at {slow[0]}=0 the {slow[0]} has the effect of a delay, so the recording cannot "
-            f"separate the two. Assume a {slow[0]} above zero, such as "
-            f"loop.replace({slow[0]}=0.05)"
+            f"at {slow[0]}=0 the {slow[0]} has the same effect as a "
+            "delay, so the recording cannot separate the two. Assume a "
+            f"{slow[0]} above zero, such as loop.replace({slow[0]}=0.05)"
         )

@@ -73,7 +73,7 @@ class MonteCarlo(ReadOnlyArrays):
         """The figures as a few lines of text."""
         refused = sum(self.failures.values())
         lines = [
-            f"{self.method}: {self.runs} runs, {refused} refused",
+            f"{self.method}: {self.runs} runs, of which {refused} were refused",
             f"  {'':<20}{'rmse':>20}{'bias':>20}{'mean bound':>12}{'coverage':>14}",
         ]
         for name, rmse in self.rmse.items():
@@ -138,7 +138,7 @@ def run_many_times(
     """Simulate and estimate `runs` times, and collect the statistics."""
     count = whole_number("runs", runs)
     if not 0.0 < level < 1.0:
-        raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
+        raise ValueError(f"level={level!r} is not between 0 and 1: give a level such as 0.95")
     truth = with_sums(loop)
     some = partial(_outcomes, truth, simulate, estimate, level, seed)
     return _summed_up(method, truth, level, shared_out(some, count, processes, progress))
@@ -204,8 +204,8 @@ def _summed_up(
     reasons = Counter(re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", one) for one in refusals)
     if not answered:
         raise NotIdentifiableError(
-            f"all {len(outcomes)} runs were refused, most of them because "
-            f"{reasons.most_common(1)[0][0]}"
+            f"all {len(outcomes)} runs were refused. The most "
+            f"frequent reason: {reasons.most_common(1)[0][0]}"
         )
     truth = {name: everything[name] for name in answered[0].values}
     estimates = {name: np.array([one.values[name] for one in answered]) for name in truth}

@@ -107,7 +107,7 @@ class PlannedBound(CramerRaoBound):
         for name in (one, other):
             if name not in self.free:
                 raise ValueError(
-                    f"{name!r} is not a free parameter; the free ones are {', '.join(self.free)}"
+                    f"{name!r} is not free. The free parameters are {', '.join(self.free)}"
                 )
         i, j = self.free.index(one), self.free.index(other)
         return float(self.cov[i, j] / np.sqrt(self.cov[i, i] * self.cov[j, j]))
@@ -144,8 +144,8 @@ def from_the_command(
     num, den = loop.plant.polynomials()
     if len(num) == len(den):
         raise NotIdentifiableError(
-            f"{loop.plant!r} has direct feedthrough: its output jumps with its command, so "
-            "there is no derivative with respect to the delay. Give the plant a lag"
+            f"{loop.plant!r} has direct feedthrough, so its output jumps with its command, "
+            "and has no derivative with respect to the delay. Give the plant a lag"
         )
     values, command, time = loop.parameters, recording.command, recording.time
     assert command is not None
@@ -274,13 +274,13 @@ def _feedback(loop: ControlLoop, experiment: Experiment, command: Array) -> Arra
     time, controller = experiment.time, loop.controller
     if experiment.relay_amplitude is not None:
         raise NotIdentifiableError(
-            "wind (air) changes the switching times of the relay, and these have no "
-            "derivative with respect to the parameters: log the command"
+            "wind (air) changes the times at which the relay switches, and these "
+            "times have no derivative with respect to the parameters: log the command"
         )
     if not isinstance(controller, P):
         raise NotIdentifiableError(
-            f"the response of {controller!r} to wind (air) is not computed: log the command, "
-            "or use a P controller"
+            f"the response of {controller!r} to wind (air) cannot "
+            "be computed: log the command, or use a P controller"
         )
     if time.size > MOST_ROWS:
         raise NotIdentifiableError(

@@ -101,17 +101,17 @@ def reasons_against(numbers: BankAnswer, white: float, range_: tuple[float, floa
     found = []
     if abs(numbers.colour) > COLOURED:
         found.append(
-            "the innovations are not white: the noise differs from the given noise, or the "
-            "plant model is incomplete"
+            "the innovations are not white, so the noise differs "
+            "from the given noise, or the plant model is incomplete"
         )
     if numbers.unexplained > UNEXPLAINED:
-        found.append("the innovations follow the command: the plant model is incomplete")
+        found.append("the innovations follow the command, so the plant model is incomplete")
     if numbers.highest > AT_END:
-        found.append(f"the delay may be above the range, which ends at {range_[1]:.3g} s")
+        found.append(f"the delay may exceed the longest that is tried, {range_[1]:.3g} s")
     if numbers.lowest > AT_END and range_[0] > 0.0:
-        found.append(f"the delay may be below the range, which begins at {range_[0]:.3g} s")
+        found.append(f"the delay may be below the shortest that is tried, {range_[0]:.3g} s")
     if numbers.white > LOUDER * white:
-        found.append(f"the noise is {numbers.white / white:.1f} times what was expected")
+        found.append(f"the noise is {numbers.white / white:.1f} times the expected noise")
     return found
 
 

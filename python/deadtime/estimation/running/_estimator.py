@@ -90,13 +90,13 @@ class OnlineEstimator:
         Mean and standard deviation of the gain before the first row. By default the gain of the
         plant and half of it.
     drift : float
-        What the delay gains by drifting in a second, s.
+        Standard deviation of the change of the delay in one second, s.
 
-        The standard deviation of its walk, s/√s.
+        The delay is a random walk with this parameter, s/√s.
     gain_drift : float
         The same for the gain, in parts of it.
     false_alarms_per_hour : float
-        Changes reported where there is none, an hour at most.
+        Largest number of false alarms per hour, which report a change of the delay without one.
 
         In the mean; zero for no search.
     memory : float
@@ -326,7 +326,7 @@ class OnlineEstimator:
         is_restless = len(self._changes) >= RESTLESS
         if is_restless:
             count = len(self._changes)
-            reason = f"not reliable: {count} changes in a minute: the plant model is incomplete"
+            reason = f"not reliable: {count} changes in a minute, so the plant model is incomplete"
             message = f"{found.message}; {reason}" if found.message else reason
             verdict: Verdict = "indication" if found.known else "none"
             found = replace(found, verdict=verdict, message=message)
@@ -346,8 +346,7 @@ class OnlineEstimator:
         """Keep a row until the noise is known; then go over all that were kept."""
         if self._rows and time <= self._rows[-1][0]:
             raise ValueError(
-                f"the time {time} s comes after {self._rows[-1][0]} s, but times must "
-                "increase: give increasing times"
+                f"the time {time} s comes after {self._rows[-1][0]} s: give increasing times"
             )
         if not self._rows:
             self._next_fit = time + LEARN
@@ -421,4 +420,4 @@ def _flight_noise(noise: Noise) -> FlightNoise:
         return noise
     if isinstance(noise, (int, float)):
         return FlightNoise(white=positive("noise", noise))
-    raise TypeError(f"noise must be a number or a FlightNoise, got {type(noise).__name__}")
+    raise TypeError(f"noise must be a number or a FlightNoise, not {type(noise).__name__}")

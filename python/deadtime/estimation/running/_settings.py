@@ -65,7 +65,7 @@ class BankSettings(NamedTuple):
         """The settings for this noise."""
         if noise.white <= 0.0:
             raise ValueError(
-                f"noise={noise!r} has no white noise: give a standard deviation above zero"
+                f"noise={noise!r} contains no white noise: give a standard deviation above zero"
             )
         return self._replace(
             white=noise.white,
@@ -87,9 +87,9 @@ def points_of_range(name: str, given: Any, number: int) -> Array:
         number = int(given[2])
     low, high = interval(name, tuple(given[:2]))
     if low < 0.0:
-        raise ValueError(f"{name}={given!r}: give times of at least zero")
+        raise ValueError(f"{name}={given!r}: give times of zero or more")
     if number < 3:
-        raise ValueError(f"{name}={given!r}: give three points or more")
+        raise ValueError(f"{name}={given!r}: give three or more points")
     return np.linspace(low, high, number)
 
 
@@ -97,8 +97,8 @@ def linear_plant(loop: ControlLoop, names: tuple[str, ...]) -> FlightPlant:
     """The plant as the kernel takes it."""
     if not loop.plant.is_linear:
         raise ValueError(
-            f"the plant {loop.plant!r} is not linear, but the filters need a linear plant: "
-            "give the plant without its limits, and the command after these limits"
+            f"the plant {loop.plant!r} is not linear, but the filters need a linear plant: give "
+            "the plant without its limits, and give commands that already follow the limits"
         )
     return plant_model(loop.plant, names)
 

@@ -105,17 +105,19 @@ class DelayTrack(ReadOnlyArrays):
         lines = [f"{last.verdict} at the end; delay over {span:.1f} s, {len(self)} rows"]
         if np.any(known):
             first = float(self.time[known][0])
-            lines.append(f"  known from {first:.2f} s on, in {np.mean(known):.0%} of the rows")
+            lines.append(
+                f"  delay known from {first:.2f} s on, in {np.mean(known):.0%} of the rows"
+            )
             low, high = float(np.min(self.delay[known])), float(np.max(self.delay[known]))
-            lines.append(f"  between {low:.3f} and {high:.3f} s")
+            lines.append(f"  delays between {low:.3f} and {high:.3f} s")
         if last.known:
             value = claimed(last.verdict, last.delay, last.stderr, "s")
             ends = f", interval {between(*last.ci, last.stderr, 's')}"
             lines.append(f"  at the end {value}{ends if last.verdict == 'reliable' else ''}")
         found = ", ".join(f"{time:.2f} s" for time in self.changes)
         lines.append(f"  changes found: {found or 'none'}")
-        lines.append(f"  informed in {np.mean(self.informed):.0%} of the rows")
-        lines.append(f"  reliable in {np.mean(self.reliable):.0%} of the rows")
+        lines.append(f"  informative command in {np.mean(self.informed):.0%} of the rows")
+        lines.append(f"  reliable delay in {np.mean(self.reliable):.0%} of the rows")
         if last.message:
             lines.append(f"  {last.message}")
         return "\n".join(lines)
@@ -220,8 +222,8 @@ def track_of(
         time, values = part.time, part.command
     else:
         raise RecordingError(
-            "the recording has no command, but the online estimate is the delay from the "
-            "command to the output: record the command too"
+            "the recording has no command, but the online estimate is the "
+            "delay from the command to the output: record the command too"
         )
     found, place = [], 0
     for row, output in zip(part.time.tolist(), part.output.tolist(), strict=True):

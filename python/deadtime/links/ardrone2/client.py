@@ -68,11 +68,11 @@ class ARDrone2(VehicleLink):
     >>> drone = ARDrone2("192.168.1.1")
     >>> drone.command(0.3)
     Traceback (most recent call last):
-    deadtime._base.errors.LinkError: 192.168.1.1 is not in the air: take off before commanding it
+    deadtime._base.errors.LinkError: 192.168.1.1 is not in the air: take off before giving commands
     """
 
     longest_take_off, longest_landing, longest_silence = 15.0, 20.0, 3.0
-    lands_unheard = "its own watchdog lands it 2 s after the last command it received"
+    lands_unheard = "the vehicle lands by itself, 2 s after the last command it has received"
 
     def __init__(
         self,
@@ -130,7 +130,8 @@ class ARDrone2(VehicleLink):
         """
         if self._vz_max is None:
             raise LinkError(
-                f"{self.host} is not connected, so the scale of its commands is unknown"
+                f"{self.host} is not connected, so the scale of its commands is not known: "
+                "connect first"
             )
         return self._vz_max
 
@@ -189,13 +190,15 @@ class ARDrone2(VehicleLink):
         heard = await link.until(lambda navdata: True, FIRST_NAVDATA)
         if not heard:
             raise LinkError(
-                f"no navdata from {host}, UDP port {link.navdata_port}, within "
+                f"no navdata has arrived from {host}, UDP port {link.navdata_port}, within "
                 f"{FIRST_NAVDATA:g} s. Check that the drone is on, this computer is in its "
                 "network, and no other client is connected"
             )
         await self._settings.set(link, self.control_port, self.limits, self.full)
         if not await link.until(lambda navdata: navdata.demo is not None, FIRST_NAVDATA):
-            raise LinkError(f"{host} sends navdata without height and battery: restart it")
+            raise LinkError(
+                f"the navdata of {host} contain neither height nor battery: restart the drone"
+            )
         self._vz_max = self._settings.vz_max
         self._restarts = self._reader.restarts
 
@@ -205,13 +208,15 @@ class ARDrone2(VehicleLink):
         speed = self.vz_max
         state = await self.state()
         if state.emergency:
-            raise LinkError(f"{self.host} is in emergency: check it, then call clear_emergency()")
+            raise LinkError(
+                f"{self.host} is in emergency: check the drone, then call clear_emergency()"
+            )
         if not state.landed:
-            raise LinkError(f"{self.host} is not on the ground: land it first")
+            raise LinkError(f"{self.host} is not on the ground: land the drone first")
         if state.battery is not None and state.battery < self.limits.min_battery:
             raise LinkError(
-                f"the battery of {self.host} is at {state.battery:g} %, below "
-                f"{self.limits.min_battery:g} %: charge it"
+                f"the battery of {self.host} is at {state.battery:g} %, below the limit of "
+                f"{self.limits.min_battery:g} %: charge the battery"
             )
         if self.limits.max_climb > speed:
             raise LinkError(
@@ -225,7 +230,7 @@ class ARDrone2(VehicleLink):
         if late > self.limits.command_age:
             raise LinkError(
                 f"this program was paused for {late:.2f} s just before the take-off of "
-                f"{self.host}, so its last known state is old: take off again"
+                f"{self.host}, so the last known state is old: take off again"
             )
 
     async def _climb(self) -> None:
@@ -234,12 +239,12 @@ class ARDrone2(VehicleLink):
         await self._wait_up(lambda: _is_up(self._reader.navdata))
         navdata = self._reader.navdata
         if navdata is None or navdata.emergency:
-            raise FlightAbortedError(f"{self.host} went into emergency while taking off")
+            raise FlightAbortedError(f"{self.host} changed to emergency during the take-off")
         self._sender.guard(now())
 
     async def _first_state(self) -> None:
         if not await self._until(lambda: self._newest is not None, FIRST_NAVDATA):
-            raise LinkError(f"no state from {self.host} within {FIRST_NAVDATA:g} s")
+            raise LinkError(f"no state has arrived from {self.host} within {FIRST_NAVDATA:g} s")
 
     def _check_vehicle(self) -> None:
         if self._sender.rival is not None:
@@ -293,8 +298,8 @@ class ARDrone2(VehicleLink):
         """
         if north or east or turn:
             raise ValueError(
-                "an AR.Drone 2.0 takes speed commands only for the climb: its horizontal "
-                "commands are angles"
+                "an AR.Drone 2.0 takes speed commands only for the climb, because its "
+                "horizontal commands are angles"
             )
         return Motion(up=self.command(up))
 
@@ -340,7 +345,7 @@ class ARDrone2(VehicleLink):
         """
         self._sender.land()
         if not await self._toggled(lambda navdata: navdata.emergency):
-            raise LinkError(f"{self.host} does not confirm that its motors are off")
+            raise LinkError(f"{self.host} does not confirm that its motors have stopped")
 
     async def clear_emergency(self) -> None:
         """Reset the emergency of a drone on the ground.
@@ -353,7 +358,8 @@ class ARDrone2(VehicleLink):
         self._sender.land()
         if not await self._toggled(lambda navdata: not navdata.emergency):
             raise LinkError(
-                f"{self.host} stays in emergency: check its motors and that it stands level"
+                f"{self.host} stays in emergency: check the motors, and check that the drone "
+                "stands level"
             )
 
     async def _toggled(self, requested: Callable[[Navdata], bool]) -> bool:

@@ -193,7 +193,9 @@ def encode(commands: Iterable[Command], first: int) -> bytes:
     try:
         return at_write([(c.wire_name, c._arguments()) for c in commands], first)
     except OverflowError as error:
-        raise ValueError(f"a number of the commands from {first} on: {error}") from None
+        raise ValueError(
+            f"a command from {first} on contains a number that is not valid: {error}"
+        ) from None
 
 
 def decode(datagram: bytes) -> list[tuple[int, Command]]:

@@ -74,16 +74,16 @@ class Connection:
     def forgotten(self) -> str:
         """Message for a drone whose numbers have restarted."""
         return (
-            f"{self.host} restarted its count of packets, so it has dropped this client: "
-            "land, and connect again"
+            f"{self.host} has restarted its count of packets, so it does not listen to this "
+            "client any more: land, and connect again"
         )
 
     @property
     def unheard(self) -> str:
         """Message for a drone that sends nothing."""
         return (
-            f"nothing received from {self.host} for {self.silent:.1f} s: it is off or out of "
-            "reach, or another client commands this drone and receives its navdata"
+            f"nothing has been received from {self.host} for {self.silent:.1f} s. Either the "
+            "drone is off or out of reach, or it sends its navdata to another client"
         )
 
     @property

@@ -60,7 +60,7 @@ class Handshake:
                 await self._clear()
                 return
         raise LinkError(
-            f"{self._name} does not acknowledge {key} = {value}, which was sent {TRIES} "
+            f"{self._name} does not acknowledge {key} = {value}, although this was sent {TRIES} "
             "times: check that no other client is connected"
         )
 
@@ -72,8 +72,8 @@ class Handshake:
             if await self._until(lambda navdata: not navdata.command_acknowledged, AGAIN):
                 return
         raise LinkError(
-            f"{self._name} keeps its acknowledgement bit set although CTRL {ACKNOWLEDGE} was sent "
-            f"for {TRIES * ANSWER:g} s: restart the drone"
+            f"CTRL {ACKNOWLEDGE} was sent for {TRIES * ANSWER:g} s, but the acknowledgement bit "
+            f"of {self._name} stays set: restart the drone"
         )
 
     async def read_back(self, host: str, port: int) -> dict[str, str]:
@@ -90,12 +90,12 @@ class Handshake:
                 async with asyncio.timeout(DUMP):
                     return parse_configuration(await self._dump(host, port))
             except asyncio.LimitOverrunError:
-                problem = f"no end within {LONGEST_DUMP} bytes"
+                problem = f"its end is missing after {LONGEST_DUMP} bytes"
             except (OSError, EOFError, ValueError) as error:  # among them TimeoutError
-                problem = str(error) or f"nothing received for {DUMP:g} s"
+                problem = str(error) or f"nothing has been received for {DUMP:g} s"
         raise LinkError(
             f"{self._name} does not send its configuration on TCP port {port} ({problem}). So "
-            "its limits are not known, and it cannot be flown"
+            "the limits of the drone are not known, and it cannot be flown"
         )
 
     async def _dump(self, host: str, port: int) -> bytes:
@@ -120,8 +120,8 @@ def check_configuration(name: str, held: Mapping[str, str], requested: Mapping[s
         if found is None or not _same(found, value):
             shown = "nothing" if found is None else found
             raise LinkError(
-                f"{name}: {key} was set to {value} but reads back as {shown}. The drone "
-                "cannot be flown, because it does not keep its limits"
+                f"{name}: {key} was set to {value}, but the drone reports {shown}. A drone that "
+                "does not keep its limits cannot be flown"
             )
 
 

@@ -79,4 +79,4 @@ class LimitSettings:
         if not before:
             return None
         kept = ", ".join(f"{key} = {value}" for key, value in before.items())
-        return f"could not be restored in {self._host}: {kept}"
+        return f"these settings could not be restored in {self._host}: {kept}"

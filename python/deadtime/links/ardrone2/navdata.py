@@ -129,22 +129,24 @@ video_stream, pressure, kalman_pressure, wifi
     header: int = HEADER
     checksum_matches: bool = True
 
-    flying = _bit(State.FLYING, "In the air, from take-off to touching down.")
+    flying = _bit(State.FLYING, "In the air, from take-off until touch-down.")
     command_acknowledged = _bit(
-        State.COMMAND_ACKNOWLEDGED, "A setting was received, and waits for ``Control(5)``."
+        State.COMMAND_ACKNOWLEDGED, "A setting was received. The drone waits for ``Control(5)``."
     )
-    demo_mode = _bit(State.DEMO, "Packets are short and come 15 times a second.")
-    bootstrap = _bit(State.BOOTSTRAP, "Not configured yet: packets are a head alone.")
+    demo_mode = _bit(State.DEMO, "Packets are short, and come 15 times per second.")
+    bootstrap = _bit(State.BOOTSTRAP, "Not configured yet, so packets contain only a header.")
     motors_problem = _bit(State.MOTORS_PROBLEM, "A motor does not turn as it should.")
-    communication_lost = _bit(State.COMMUNICATION_LOST, "Without commands for 2 s.")
+    communication_lost = _bit(State.COMMUNICATION_LOST, "No command was received for 2 s.")
     software_fault = _bit(State.SOFTWARE_FAULT, "The drone's program has failed.")
-    battery_low = _bit(State.BATTERY_LOW, "Charge for no more than landing.")
+    battery_low = _bit(State.BATTERY_LOW, "The battery is sufficient only for landing.")
     angles_out_of_range = _bit(State.ANGLES_OUT_OF_RANGE, "Tilted too far.")
-    too_much_wind = _bit(State.TOO_MUCH_WIND, "More wind than it can hold against.")
+    too_much_wind = _bit(State.TOO_MUCH_WIND, "The wind is too strong.")
     ultrasound_deaf = _bit(State.ULTRASOUND_DEAF, "The height is lost.")
     cutout = _bit(State.CUTOUT, "The motors have been stopped.")
-    com_watchdog = _bit(State.COM_WATCHDOG, "Without commands for 50 ms: information, no alarm.")
-    emergency = _bit(State.EMERGENCY, "Motors cut until the emergency is ended.")
+    com_watchdog = _bit(
+        State.COM_WATCHDOG, "No command was received for 50 ms. This is information, not an alarm."
+    )
+    emergency = _bit(State.EMERGENCY, "The motors stay off until the emergency is ended.")
 
     @property
     def height(self) -> float | None:
@@ -277,4 +279,4 @@ def build_navdata(navdata: Navdata) -> bytes:
     try:
         return navdata_write(options, **head)
     except OverflowError as error:
-        raise ValueError(f"a word of the head {head}, or a tag: {error}") from None
+        raise ValueError(f"a word of the header {head}, or a tag, is not valid: {error}") from None

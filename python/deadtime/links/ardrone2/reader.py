@@ -39,10 +39,10 @@ FAULTS = {
     State.ULTRASOUND_DEAF: "its ultrasound receives no echo",
     State.MOTORS_PROBLEM: "a motor does not turn as it should",
     State.CUTOUT: "its motors have been stopped",
-    State.ANGLES_OUT_OF_RANGE: "it is tilted too far",
+    State.ANGLES_OUT_OF_RANGE: "it is tilted too much",
     State.SOFTWARE_FAULT: "its program has failed",
-    State.TOO_MUCH_WIND: "there is more wind than it can hold against",
-    State.BATTERY_LOW: "its battery lasts for no more than landing",
+    State.TOO_MUCH_WIND: "the wind is too strong",
+    State.BATTERY_LOW: "its battery is sufficient only for landing",
 }
 
 
@@ -272,7 +272,7 @@ def unasked_end(navdata: Navdata, left_ground: bool) -> str | None:
     if fault is not None:
         return f"the vehicle lands by itself: {fault}"
     return (
-        "the vehicle lands without a command from this program, and reports no fault: most "
+        "the vehicle lands without a command from this program, and reports no fault. Most "
         "likely another client commands this drone"
     )
 

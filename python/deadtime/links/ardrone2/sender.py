@@ -126,8 +126,8 @@ class CommandSender(ExpiringCommand):
         most = self.limits.landing_after
         if self._uncertain and now - self.resumed > most:
             self.give_up(
-                f"no message sent after a pause of this program has been received for {most:g}"
-                " s: the vehicle was commanded to land"
+                "since a pause of this program, no message from the vehicle has arrived for "
+                f"{most:g} s. The vehicle was commanded to land"
             )
         super().age(now)
 
@@ -140,8 +140,8 @@ class CommandSender(ExpiringCommand):
         self._motion = Hover
         if pause > WATCHDOG:
             self.give_up(
-                f"this program was paused for {pause:.2f} s. In such a pause the vehicle's "
-                f"own watchdog lands it ({WATCHDOG:g} s). The vehicle was commanded to land"
+                f"this program was paused for {pause:.2f} s. In such a pause the vehicle lands "
+                f"by itself after {WATCHDOG:g} s. The vehicle was commanded to land"
             )
         else:
             self._uncertain = self.in_air
@@ -180,6 +180,7 @@ class CommandSender(ExpiringCommand):
             self._echo = number
         elif self._echo:
             self.rival = (
-                f"another client commands this drone: it has executed REF number {number}, "
-                "which this program did not send. End the other client, and connect again"
+                "another client commands this drone, because the drone has executed REF number "
+                f"{number}, which this program did not send. End the other client, and connect "
+                "again"
             )

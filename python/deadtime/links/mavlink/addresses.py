@@ -60,8 +60,8 @@ class LinkAddress:
         known = kind in get_args(Kind) and bool(host)
         if not known or not port.isdecimal() or not 1 <= int(port) <= most:
             raise ValueError(
-                f"the address {text!r}: give udp:HOST:PORT to wait there for a vehicle, "
-                "udpout:HOST:PORT to send to one first, tcp:HOST:PORT to connect to one, or "
+                f"the address {text!r} has no known form. Give udp:HOST:PORT to wait for a "
+                "vehicle, udpout:HOST:PORT to send first, tcp:HOST:PORT to connect, or "
                 "serial:DEVICE:BAUD"
             )
         return cls(kind, host, int(port))  # type: ignore[arg-type]
@@ -77,7 +77,7 @@ class LinkAddress:
         """
         found = tuple(cls.of(one) for one in text.split(","))
         if len(set(found)) < len(found):
-            raise ValueError(f"the addresses {text!r}: give each link once")
+            raise ValueError(f"the addresses {text!r} contain a link twice: give each link once")
         return found
 
     @property

@@ -67,8 +67,8 @@ class Authority:
         """Raise for a vehicle that is armed, but not by this link."""
         if reader.armed and not self.armed_here:
             raise LinkError(
-                f"{self._name}: the vehicle is armed already, but not by this link, so "
-                "somebody else is flying it"
+                f"{self._name}: the vehicle is armed already, but not by this link, so somebody "
+                "else is flying the vehicle"
             )
 
     def fly(self, *modes: int) -> None:
@@ -98,7 +98,7 @@ class Authority:
         if left:
             self.lost = self.lost or self._was_taken(mode, pilot, link, time)
             if reader.has_lost_position and "position estimate" not in self.lost:
-                self.lost += "; the vehicle has lost its position estimate"
+                self.lost += ". The vehicle has also lost its position estimate"
             self.is_sure = reader.modes.is_sure(mode)
         elif self.disarmed is not None:
             self.lost = self.lost or self.disarmed

@@ -165,7 +165,7 @@ class ArduPilot(Autopilot):
             return
         held = await parameters.read("GUID_OPTIONS")
         if held is None:
-            raise LinkError("the vehicle does not answer for its GUID_OPTIONS")
+            raise LinkError("the vehicle does not report its parameter GUID_OPTIONS")
         await parameters.plan("GUID_OPTIONS", float(int(held) | THRUST_AS_THRUST))
 
     def mode(self, custom: int) -> tuple[float, ...]:
@@ -190,16 +190,18 @@ class ArduPilot(Autopilot):
         if station is None:
             station = await parameters.read("MAV_GCS_SYSID")  # its name since 4.7
         if station is None:
-            raise LinkError("the vehicle does not answer for its SYSID_MYGCS")
+            raise LinkError("the vehicle does not report its parameter SYSID_MYGCS")
         if station != system:
             raise LinkError(
-                f"the vehicle expects heartbeats of system {station:g} (SYSID_MYGCS), but "
-                f"this program is system {system}: connect as that system, or change the "
+                f"the vehicle expects heartbeats of system {station:g} (SYSID_MYGCS), but this "
+                f"program is system {system}: connect as system {station:g}, or change the "
                 "parameter"
             )
         kinds, fenced = await parameters.read("FENCE_TYPE"), await parameters.read("FENCE_ENABLE")
         if kinds is None or fenced is None:
-            raise LinkError("the vehicle does not answer for its fence (FENCE_TYPE, FENCE_ENABLE)")
+            raise LinkError(
+                "the vehicle does not report the parameters of its fence (FENCE_TYPE, FENCE_ENABLE)"
+            )
         own = int(kinds) if fenced else 0
         await self._check_fence(parameters, limits, own)
         silence = await _at_most(parameters, SILENCE, "GUID_TIMEOUT")
@@ -231,8 +233,9 @@ class ArduPilot(Autopilot):
             low = await parameters.read("FENCE_ALT_MIN")
             if low is not None and low > limits.min_height:
                 raise LinkError(
-                    f"the vehicle's own fence begins at {low:g} m (FENCE_ALT_MIN), above min_height"
-                    f" = {limits.min_height:g} m: give a larger min_height, or lower the fence"
+                    f"the vehicle's own fence begins at {low:g} m (FENCE_ALT_MIN), but "
+                    f"min_height = {limits.min_height:g} m is below: give a larger min_height, "
+                    "or lower the fence"
                 )
 
 
@@ -294,7 +297,7 @@ async def _reaches(parameters: Parameters, name: str, limit: str, needed: float)
     held = await parameters.read(name)
     if held is not None and 0.0 < held < needed:
         raise LinkError(
-            f"the vehicle's own fence is at {held:g} m ({name}), and this flight may reach "
+            f"the vehicle's own fence is at {held:g} m ({name}), but this flight may reach "
             f"{needed:g} m: give a smaller {limit}, or a wider fence"
         )
 
@@ -303,7 +306,7 @@ async def _at_most(parameters: Parameters, most: float, name: str) -> float:
     """Lower a parameter to a value, if it is higher; return what holds."""
     held = await parameters.read(name)
     if held is None:
-        raise LinkError(f"the vehicle does not answer for its {name}")
+        raise LinkError(f"the vehicle does not report its parameter {name}")
     if 0.0 < held <= most:
         parameters.kept[name] = held
         return held
@@ -322,7 +325,7 @@ def autopilot_of(heartbeat: Any) -> Autopilot:
     d = dialect()
     if heartbeat.type not in COPTERS:
         raise LinkError(
-            f"the vehicle is of type {heartbeat.type} (MAV_TYPE), but only multicopters can "
+            f"the vehicle has the type {heartbeat.type} (MAV_TYPE), but only multicopters can "
             "be flown"
         )
     if heartbeat.autopilot == d.MAV_AUTOPILOT_ARDUPILOTMEGA:
@@ -330,8 +333,8 @@ def autopilot_of(heartbeat: Any) -> Autopilot:
     if heartbeat.autopilot == d.MAV_AUTOPILOT_PX4:
         return PX4()
     raise LinkError(
-        f"the autopilot is number {heartbeat.autopilot}, but only ArduPilot (3) and PX4 (12) "
-        "can be flown"
+        f"the autopilot has the number {heartbeat.autopilot}, but only ArduPilot (3) and PX4 "
+        "(12) can be flown"
     )
 
 

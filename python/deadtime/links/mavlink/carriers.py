@@ -77,8 +77,8 @@ class Carriers:
             self._use(best)
             lost.named = True
             self._tell(
-                f"{lost.address}: nothing received for {lost.silent:.1f} s; the vehicle is reached "
-                f"over {best.address}"
+                f"{lost.address}: nothing has been received for {lost.silent:.1f} s. The "
+                f"vehicle is now reached over {best.address}"
             )
         for one in self._all:
             if one in alive:
@@ -86,7 +86,8 @@ class Carriers:
             elif one is not self.current and one.silent > NAMED and not one.named:
                 one.named = True
                 self._tell(
-                    f"{one.address}: nothing received for {one.silent:.1f} s; it was in reserve"
+                    f"{one.address}: nothing has been received for {one.silent:.1f} s. This "
+                    "link was in reserve"
                 )
 
     @contextmanager

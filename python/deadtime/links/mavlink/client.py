@@ -84,11 +84,11 @@ class MAVLinkVehicle(Settings):
     >>> vehicle.command(0.3)
     Traceback (most recent call last):
     deadtime._base.errors.LinkError: tcp:127.0.0.1:5760 is not in the air: take off before \
-commanding it
+giving commands
     """
 
     longest_take_off, longest_landing, longest_silence = 30.0, 60.0, 5.0
-    lands_unheard = "it lands by its own failsafe"
+    lands_unheard = "the vehicle lands by its own failsafe"
 
     def __init__(
         self,
@@ -109,8 +109,8 @@ commanding it
         self.take_off_height = positive("take_off_height", take_off_height)
         if not self.limits.min_height < take_off_height < self.limits.max_height:
             raise ValueError(
-                f"take_off_height={take_off_height:g} is not between "
-                f"{self.limits.min_height:g} and {self.limits.max_height:g} m"
+                f"take_off_height={take_off_height:g} m is not within the limits, "
+                f"{self.limits.min_height:g} to {self.limits.max_height:g} m"
             )
         for name, number in {"system": system, "component": component, "vehicle": vehicle}.items():
             if number is not None and not 1 <= number <= 255:
@@ -221,7 +221,8 @@ commanding it
         if heartbeat is None:
             heard = f"; others send: {', '.join(self.foreign)}" if self.foreign else ""
             raise LinkError(
-                f"no vehicle sends heartbeats at {self.address} within {FIRST_HEARTBEAT:g} s{heard}"
+                f"within {FIRST_HEARTBEAT:g} s no heartbeat of a vehicle has arrived at "
+                f"{self.address}{heard}"
             )
         pilot = self._autopilot = autopilot_of(heartbeat)
         self._reader.estimator = pilot.estimator
@@ -229,14 +230,15 @@ commanding it
             await asyncio.sleep(HEARTBEATS)
         if self._vehicle is None and (others := link.senders.vehicles):
             raise LinkError(
-                f"several vehicles are on {self.address}: system {link.target[0]}, "
-                f"{', '.join(map(str, others))}: give `vehicle`, the system of the vehicle to fly"
+                f"{self.address} reaches several vehicles, system {link.target[0]}, "
+                f"{', '.join(map(str, others))}: give `vehicle`, the system number of the "
+                "vehicle to fly"
             )
         if strangers := link.carriers.other_vehicles:
             raise LinkError(
-                f"the vehicle that answers over {strangers[0].address} is not the one that "
-                f"answers over {link.carriers.current.address}, because their clocks differ: "
-                "give links to one vehicle"
+                f"the vehicles at {strangers[0].address} and {link.carriers.current.address} "
+                "have different clocks, so they are two vehicles: give only links to one "
+                "vehicle"
             )
         self._authority.refuse_armed(self._reader)
         vehicle = VehicleId(pilot.name, link.target[0], await link.board())
@@ -244,8 +246,8 @@ commanding it
         self._parameters = Parameters(link, pilot.integers_as_bits, changed)
         if self._simulated and not await self._is_simulator(pilot):
             raise LinkError(
-                f"the vehicle at {self.address} does not identify itself as a simulator, and "
-                "a router may lead to a real vehicle. If its flight cannot hurt or damage "
+                f"the vehicle at {self.address} does not report that it is a simulator, and a "
+                "router may lead to a real vehicle. If its flight cannot hurt or damage "
                 "anything, give simulated=False, or --i-have-a-safe-area on the command line"
             )
         await ask_over_all(link, pilot)
@@ -309,7 +311,7 @@ commanding it
 
     async def _prepare(self) -> None:
         if self._meddled is not None:
-            raise LinkError(f"{self.address}: {self._meddled}: connect again")
+            raise LinkError(f"{self.address}: {self._meddled}. Connect again")
         self._set_points.expired = None  # that of an earlier flight
         await self._steps().prepare(self.limits.min_battery)
 
@@ -323,8 +325,8 @@ commanding it
     async def _first_state(self) -> None:
         if not await self._until(lambda: self._newest is not None, FIRST_HEARTBEAT):
             raise LinkError(
-                f"{self.address}: {self._known.name} sends no LOCAL_POSITION_NED: it has no "
-                "position yet"
+                f"{self.address}: {self._known.name} sends no LOCAL_POSITION_NED, so the "
+                "vehicle has no position yet"
             )
 
     async def _keep_sending(self) -> None:
@@ -369,7 +371,7 @@ commanding it
         self._command_landing()
         lands = self._reader.mode == self._known.landing or self._reader.landed_state == ON_GROUND
         if self._authority.is_sure and not lands:
-            raise LinkError(f"{self._authority.lost}: it was not commanded to land")
+            raise LinkError(f"{self._authority.lost}. The vehicle was not commanded to land")
         on_ground = self._reader.landed_state == ON_GROUND and self._authority.holds
         if on_ground and passed > DISARM_AFTER and now() - self._disarming_sent > AGAIN:
             self._disarming_sent, d = now(), dialect()

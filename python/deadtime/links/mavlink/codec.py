@@ -36,8 +36,8 @@ def dialect() -> Any:
         )
     except ImportError as error:
         raise MissingExtraError(
-            "MAVLink needs pymavlink, which is not installed; this line installs it: "
-            "pip install 'deadtime[mavlink]'"
+            "MAVLink needs pymavlink, which is not installed. This command installs it: pip "
+            "install 'deadtime[mavlink]'"
         ) from error
     return ardupilotmega
 
@@ -86,11 +86,11 @@ class Codec:
         messages = dialect()
         if messages.MAVLINK_IGNORE_CRC:
             raise LinkError(
-                f"MAV_IGNORE_CRC={os.environ.get('MAV_IGNORE_CRC')} makes pymavlink accept "
-                "damaged frames: unset this variable"
+                f"with MAV_IGNORE_CRC={os.environ.get('MAV_IGNORE_CRC')}, pymavlink accepts "
+                "damaged frames: unset this environment variable"
             )
         if key is not None and len(key) != KEY:
-            raise ValueError(f"a signing key of {len(key)} bytes: give {KEY}")
+            raise ValueError(f"the signing key has {len(key)} bytes: give {KEY} bytes")
         self._mav = messages.MAVLink(None, system, component)
         self._mav.robust_parsing = True
         self.refused = self.unknown = 0

@@ -78,7 +78,7 @@ class Commanding(VehicleLink):
 
     @property
     def _unheard(self) -> str:
-        return f"nothing received from {self.address} for {self._link.silent:.1f} s"
+        return f"nothing has been received from {self.address} for {self._link.silent:.1f} s"
 
     def _age(self) -> None:
         super()._age()
@@ -157,7 +157,9 @@ class Commanding(VehicleLink):
             If there is no such kind.
         """
         if kind not in get_args(Kind):
-            raise ValueError(f"no set points of kind {kind!r}: {', '.join(get_args(Kind))}")
+            raise ValueError(
+                f"{kind!r} is not a kind of set point: give one of {', '.join(get_args(Kind))}"
+            )
         await self._known.allow(self._held, self.limits, kind)
         await self._held.apply()
         self._allowed.add(kind)
@@ -256,17 +258,20 @@ class Commanding(VehicleLink):
     def _ready(self, kind: Kind) -> VehicleState:
         """The newest state, where set points of a kind may be commanded."""
         if kind not in self._allowed:
-            raise LinkError(f"{self.address}: `await allow({kind!r})` before commanding it")
+            raise LinkError(
+                f"{self.address}: set points of kind {kind!r} are not allowed yet. First use "
+                f"`await allow({kind!r})`"
+            )
         self._check_in_air()
         if self._reader.newest is None:
-            raise LinkError(f"{self.address}: no message with the state of the vehicle has arrived")
+            raise LinkError(f"{self.address}: the vehicle has not reported its state yet")
         return self._reader.newest
 
     def _heading(self, state: VehicleState, given: float | None) -> float:
         """The heading that was given, or else the present one."""
         heading = state.yaw if given is None else given
         if heading is None:
-            raise LinkError(f"{self.address}: the vehicle reports no heading: give one")
+            raise LinkError(f"{self.address}: the vehicle reports no heading: give a heading")
         return heading
 
     def _follow(self, point: Point) -> None:

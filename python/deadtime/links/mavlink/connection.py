@@ -306,7 +306,7 @@ class Connection:
         texts = list(dict.fromkeys(text for time, text in self.texts if time >= since))
         if not texts:
             return ""
-        return '; the vehicle says "' + '", "'.join(texts[-3:]) + '"'
+        return '. The vehicle says "' + '", "'.join(texts[-3:]) + '"'
 
 
 def _warn(what: str) -> None:

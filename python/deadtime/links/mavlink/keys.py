@@ -36,6 +36,7 @@ def read_key(path: Path) -> bytes:
         key = b""
     if len(key) != KEY:
         raise ValueError(
-            f"{path} holds no signing key: give {KEY} bytes, or their {2 * KEY} hexadecimal digits"
+            f"{path} contains no signing key: give {KEY} bytes, or their {2 * KEY} "
+            "hexadecimal digits"
         )
     return key

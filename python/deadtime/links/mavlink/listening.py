@@ -67,7 +67,7 @@ def heard_rows(
         If it cannot be opened.
     """
     if address.kind != "udp":
-        raise ValueError(f"{address}: give udp:HOST:PORT, at which a link is listened to")
+        raise ValueError(f"{address}: only listening is possible here, so give udp:HOST:PORT")
     codec, begun = Codec(255, 0, key), time.monotonic()
     vehicle = Senders((255, 0), system)
     family = socket.AF_INET6 if ":" in address.host else socket.AF_INET

@@ -94,7 +94,9 @@ class Parameters:
         self.kept.pop(name, None)
         held = await self.read(name)
         if held is None:
-            raise LinkError(f"{self._link.address}: the vehicle does not answer for its {name}")
+            raise LinkError(
+                f"{self._link.address}: the vehicle does not report its parameter {name}"
+            )
         before = self.changed.changes.get(name, Change(held, value)).before
         if same(held, value):
             self.kept[name] = value
@@ -131,8 +133,8 @@ class Parameters:
                 await asyncio.to_thread(self.changed.save)
         except OSError as error:
             raise LinkError(
-                f"{self.changed.path}, which keeps the old parameters of the vehicle, cannot be "
-                f"written: {error}"
+                f"{self.changed.path} cannot be written, but the old parameters of the vehicle "
+                f"must be kept in this file: {error}"
             ) from error
 
     async def _write(self, name: str, value: float) -> None:
@@ -145,7 +147,7 @@ class Parameters:
                 break
             if same(held, value):
                 return
-        raise LinkError(f"{link.address}: the vehicle does not keep the value {name} = {value:g}")
+        raise LinkError(f"{link.address}: the vehicle does not accept the value {name} = {value:g}")
 
     def contradicts(self, message: Any) -> bool:
         """Whether a message says another value of a parameter than was set."""
@@ -197,8 +199,8 @@ class Parameters:
                 held = await self.read(name)
                 if held is None or not may():
                     raise LinkError(
-                        f"{self._link.address}: the vehicle does not answer for its {name}, or is "
-                        "not on the ground"
+                        f"{self._link.address}: the vehicle does not report its parameter "
+                        f"{name}, or is not on the ground"
                     )
                 if same(held, change.set):
                     await self._write(name, change.before)
@@ -209,8 +211,8 @@ class Parameters:
                 left.save()
         except LinkError as error:
             raise LinkError(
-                f"{error}. The parameters that an earlier run changed remain changed. The vehicle "
-                f"had {left.words()}: see {left.path}"
+                f"{error}. The parameters that an earlier run changed remain changed. Before, "
+                f"the vehicle had {left.words()}: see {left.path}"
             ) from error
         return since
 
@@ -220,9 +222,10 @@ class Parameters:
         if not self.changed.changes:
             return None
         return (
-            f"{self._link.address}: could not be put back in the vehicle: {self.changed.words()}. "
-            f"{self.changed.path} keeps them: the next connection puts them back, and so does "
-            f"`deadtime fly --link {self._link.address} --restore`"
+            f"{self._link.address}: these parameters could not be restored in the vehicle: "
+            f"{self.changed.words()}. Their values are kept in {self.changed.path}. The next "
+            f"connection restores them, and so does `deadtime fly --link {self._link.address} "
+            "--restore`"
         )
 
 

@@ -78,7 +78,7 @@ class Senders:
             elif message.type == d.MAV_TYPE_GCS:
                 one.kind = "another ground station"
                 if (system, component) == self.own:
-                    one.kind = "another ground station with the ids of this one"
+                    one.kind = "another ground station with the same ids as this program"
             else:
                 one.kind = "another component"
 
@@ -90,7 +90,7 @@ class Senders:
     @property
     def named(self) -> str:
         """Other ground stations as a clause, or nothing."""
-        return "".join(f"; on the link is {one}" for one in self.ground_stations)
+        return "".join(f". Another sender on the link is {one}" for one in self.ground_stations)
 
     @property
     def vehicles(self) -> list[Foreign]:

@@ -39,7 +39,7 @@ class SerialPort:
             import serial  # type: ignore[import-untyped, unused-ignore]
         except ImportError as error:
             raise MissingExtraError(
-                "a serial port needs pyserial, which is not installed; this line installs "
+                "a serial port needs pyserial, which is not installed. This command installs "
                 "it: pip install 'deadtime[mavlink]'"
             ) from error
         self._receive, self._loop = receive, asyncio.get_running_loop()
@@ -53,8 +53,8 @@ class SerialPort:
         except (AttributeError, NotImplementedError, OSError) as error:
             self._port.close()
             raise LinkError(
-                f"{device}: the event loop of this system cannot wait for a serial port: let "
-                "a router forward the port to UDP"
+                f"{device}: in this operating system, the program cannot wait for a serial "
+                "port. Let a router forward the port to UDP"
             ) from error
 
     def _read(self) -> None:

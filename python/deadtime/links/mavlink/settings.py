@@ -38,7 +38,7 @@ class Settings(Commanding):
         """
         value = await self._held.read(name)
         if value is None:
-            raise LinkError(f"{self.address}: the vehicle does not answer for its {name}")
+            raise LinkError(f"{self.address}: the vehicle does not report its parameter {name}")
         return value
 
     async def set_parameter(self, name: str, value: float) -> None:
@@ -99,15 +99,15 @@ class Settings(Commanding):
         """Put back what earlier runs have left changed, and tell it."""
         for left in ChangedParameters.left(self._held.changed.vehicle, self._folder):
             tell(
-                f"{self.address}: the run of {left.written} was killed or lost its link, and has "
-                f"left parameters changed in the vehicle. It had {left.words()}: these are put "
-                "back before anything is set"
+                f"{self.address}: the run of {left.written} was killed or lost its link, so "
+                "changed parameters remain in the vehicle. Before, the vehicle had "
+                f"{left.words()}. These values are restored before anything is set"
             )
             await self._until(self._may_put_back, GROUND_KNOWN)
             if since := await self._held.restore(left, self._may_put_back):
                 tell(
-                    f"{self.address}: somebody has changed these since, and they are left alone: "
-                    f"{', '.join(since)}"
+                    f"{self.address}: somebody has changed these parameters since then, so they "
+                    f"keep their values: {', '.join(since)}"
                 )
 
     def _compare(self, message: Any, time: float, pilot: Autopilot) -> None:
@@ -120,7 +120,10 @@ class Settings(Commanding):
         elif kind == "POSITION_TARGET_LOCAL_NED" and pilot.echoes:
             if points.are_not(echo := echo_of(message, time)):
                 speeds = ", ".join(f"{one:g}" for one in echo[2:] if one is not None)
-                self._give_up(f"the vehicle follows {speeds} m/s, not commanded from here")
+                self._give_up(
+                    f"the vehicle follows a setpoint of {speeds} m/s, which this program has not "
+                    "sent"
+                )
         elif self._parameters is not None and self._parameters.contradicts(message):
             name = message.param_id
             if name not in self._asking:

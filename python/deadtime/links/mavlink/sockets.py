@@ -62,7 +62,7 @@ class LinkSocket:
                     lambda: _Datagrams(self._receive), local_addr=place
                 )
         except (OSError, TimeoutError) as error:
-            reason = str(error) or f"no answer within {CONNECTING:g} s"
+            reason = str(error) or f"no answer has come within {CONNECTING:g} s"
             raise LinkError(f"{address} cannot be opened: {reason}") from None
         self._connected = address.kind != "udp"
 

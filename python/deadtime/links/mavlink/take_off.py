@@ -112,7 +112,9 @@ class TakeOff:
         if not state.landed:
             raise self._failed("is not on the ground")
         if state.battery is not None and state.battery < min_battery:
-            raise self._failed(f"has {state.battery:g} % of battery, below {min_battery:g} %")
+            raise self._failed(
+                f"has {state.battery:g} % of battery, but {min_battery:g} % are needed"
+            )
 
     async def fly(
         self,
@@ -153,7 +155,7 @@ class TakeOff:
             await self._link.command(dialect().MAV_CMD_DO_SET_MODE, *self._pilot.mode(custom))
             if await self._link.until(lambda: self._reader.mode == custom, SHOWN):
                 return
-        raise self._failed(f"does not change to {self._pilot.mode_name(custom)}")
+        raise self._failed(f"does not change to the mode {self._pilot.mode_name(custom)}")
 
     async def _arm(self) -> None:
         """Arm, once the vehicle agrees: some of its checks pass only a while after power-up."""
@@ -169,7 +171,7 @@ class TakeOff:
                 if await self._link.until(lambda: bool(self._reader.armed), SHOWN):
                     break
                 if now() - begin > ARMING:
-                    raise self._failed("does not arm")
+                    raise self._failed("does not arm its motors")
         finally:
             self._authority.arming = False
         if not self._authority.armed_here:

@@ -118,7 +118,9 @@ LOOPBACK = ("127.0.0.1", 0)
 def _address(text: str) -> Address:
     host, colon, port = text.rpartition(":")
     if not colon or not port.isdecimal() or int(port) > 65535:
-        raise argparse.ArgumentTypeError(f"{text!r} is not HOST:PORT, such as 127.0.0.1:5600")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not an address: give HOST:PORT, such as 127.0.0.1:5600"
+        )
     return host.removeprefix("[").removesuffix("]") or "127.0.0.1", int(port)
 
 
@@ -133,69 +135,91 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m deadtime.links.udp", description=__doc__)
     parts = parser.add_subparsers(required=True, metavar="controller|relay|plant")
 
-    controller = parts.add_parser("controller", help="answers measurements with commands")
+    controller = parts.add_parser("controller", help="answer measurements with commands")
     controller.set_defaults(run=_run_controller)
     controller.add_argument("--gain", type=float, required=True, help="K, 1/s")
     controller.add_argument("--listen", type=_address, default=LOOPBACK, help="HOST:PORT")
-    controller.add_argument("--plant", type=_address, help="answer this address alone")
+    controller.add_argument("--plant", type=_address, help="answer only this address")
     controller.add_argument(
-        "--every", action="store_true", help="answer every measurement, for a jitter buffer"
+        "--every", action="store_true", help="answer every measurement; needed with a jitter buffer"
     )
 
-    relay = parts.add_parser("relay", help="emulates the network between them")
+    relay = parts.add_parser("relay", help="emulate the network between plant and controller")
     relay.set_defaults(run=_run_relay)
     relay.add_argument("--listen", type=_address, default=LOOPBACK, help="HOST:PORT")
-    relay.add_argument("--to", type=_address, required=True, help="the controller")
+    relay.add_argument("--to", type=_address, required=True, help="address of the controller")
     relay.add_argument("--delay", type=float, default=0.05, help="mean one-way delay, s")
-    relay.add_argument("--jitter", type=float, default=0.0, help="its standard deviation, s")
-    relay.add_argument("--delays", choices=DELAYS, default="gamma", help="its distribution")
-    relay.add_argument("--loss", type=float, default=0.0, help="part of the packets lost")
+    relay.add_argument(
+        "--jitter", type=float, default=0.0, help="standard deviation of the delay, s"
+    )
+    relay.add_argument(
+        "--delays", choices=DELAYS, default="gamma", help="distribution of the delay"
+    )
+    relay.add_argument("--loss", type=float, default=0.0, help="share of the packets that are lost")
     relay.add_argument("--burst", type=float, default=1.0, help="mean length of a burst of losses")
-    relay.add_argument("--duplication", type=float, default=0.0, help="part that comes twice")
+    relay.add_argument("--duplication", type=float, default=0.0, help="share that arrives twice")
     relay.add_argument("--ordered", action="store_true", help="no packet overtakes another")
     for path, which in zip(PATHS, ("to the controller", "to the plant"), strict=True):
         relay.add_argument(
             f"--{path.replace('_', '-')}",
             metavar="JSON",
-            help=f"the network {which}, in place of the options above",
+            help=f"the network {which}, instead of the options above",
         )
-    relay.add_argument("--seed", type=int, default=0, help="of delays and losses")
+    relay.add_argument("--seed", type=int, default=0, help="seed of delays and losses")
 
-    plant = parts.add_parser("plant", help="an integrator with sampled output")
+    plant = parts.add_parser("plant", help="simulate an integrator whose output is sampled")
     plant.set_defaults(run=_run_plant)
     plant.add_argument(
-        "--controller", type=_address, required=True, help="the controller, or a relay"
+        "--controller",
+        type=_address,
+        required=True,
+        help="address of the controller, or of a relay",
     )
     plant.add_argument(
         "--listen", type=_address, help="HOST:PORT. Default: where the controller can answer"
     )
-    plant.add_argument("--gain", type=float, default=1.0, help="of the integrator")
-    plant.add_argument("--lag", type=float, default=0.0, help="of the integrator, s")
-    plant.add_argument("--sample-time", type=float, default=0.01, help="between measurements, s")
+    plant.add_argument("--gain", type=float, default=1.0, help="gain of the integrator")
+    plant.add_argument("--lag", type=float, default=0.0, help="lag of the integrator, s")
+    plant.add_argument(
+        "--sample-time", type=float, default=0.01, help="time between measurements, s"
+    )
     plant.add_argument("--rest", type=float, default=1.0, help="time before the step, s")
-    plant.add_argument("--amplitude", type=float, default=1.0, help="of the step")
-    plant.add_argument("--policy", choices=POLICIES, default="newest", help="for late commands")
-    plant.add_argument("--policy-number", type=float, help="time in s, or number of samples")
+    plant.add_argument("--amplitude", type=float, default=1.0, help="size of the step")
+    plant.add_argument(
+        "--policy", choices=POLICIES, default="newest", help="policy for late commands"
+    )
+    plant.add_argument(
+        "--policy-number",
+        type=float,
+        help="a time in s for the policies drop-late and jitter-buffer, or a number of samples for "
+        "hold",
+    )
 
     for part, duration in ((controller, math.inf), (relay, math.inf), (plant, 6.0)):
-        part.add_argument("--duration", type=_time, default=duration, help="how long to run, s")
+        part.add_argument("--duration", type=_time, default=duration, help="duration of the run, s")
         part.add_argument(
             "--until-input-ends",
             action="store_true",
-            help="end at the end of standard input, that is with the parent process",
+            help="end with the parent process, when standard input ends",
         )
     for part in (controller, plant):
-        part.add_argument("--limit", type=float, default=20.0, help="largest size of the command")
-        part.add_argument("--watchdog", type=float, default=0.5, help="longest silence, s")
-        part.add_argument("--safe", type=float, default=0.0, help="command after such a silence")
+        part.add_argument(
+            "--limit", type=float, default=20.0, help="largest magnitude of the command"
+        )
+        part.add_argument(
+            "--watchdog", type=float, default=0.5, help="longest time without a packet, s"
+        )
+        part.add_argument(
+            "--safe", type=float, default=0.0, help="command that applies after such a silence"
+        )
         part.add_argument("--recording", type=Path, help="CSV file to write")
         part.add_argument(
             "--doubles",
             type=int,
             nargs=2,
             metavar=("IN", "OUT"),
-            help="use plain doubles as Simulink does: their number in a datagram from and to the "
-            "other end",
+            help="use plain doubles as Simulink does. IN and OUT are their numbers in a "
+            "received and in a sent datagram",
         )
     return parser
 

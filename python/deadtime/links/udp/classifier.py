@@ -24,9 +24,9 @@ LATEST = 2.0**33
 class Verdict(Enum):
     """Class of a packet."""
 
-    IMPOSSIBLE = "it has impossible values"
-    PLAUSIBLE = "it is plausible, and answers no packet of this end"
-    ANSWER = "it answers a packet of this end"
+    IMPOSSIBLE = "the packet has impossible values"
+    PLAUSIBLE = "the packet is plausible, but does not answer a packet of this end"
+    ANSWER = "the packet answers a packet of this end"
 
 
 class Classifier:
@@ -43,9 +43,9 @@ class Classifier:
     >>> classifier.sent(7, 1.0)
     >>> answer = LoopPacket(1, sent=500.0, echo_sequence=7, echo_sent=1.0, held=0.01)
     >>> classifier.of(answer, now=1.1)
-    <Verdict.ANSWER: 'it answers a packet of this end'>
+    <Verdict.ANSWER: 'the packet answers a packet of this end'>
     >>> classifier.of(answer, now=1.001)  # held for longer than the round trip
-    <Verdict.PLAUSIBLE: 'it is plausible, and answers no packet of this end'>
+    <Verdict.PLAUSIBLE: 'the packet is plausible, but does not answer a packet of this end'>
     """
 
     def __init__(self, remembered: int = REMEMBERED) -> None:

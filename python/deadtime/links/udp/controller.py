@@ -73,7 +73,7 @@ class ControllerOptions:
         positive("limit", self.limit)
         positive("watchdog", self.watchdog)
         if abs(finite("safe", self.safe)) > self.limit:
-            raise ValueError(f"safe={self.safe} is beyond limit={self.limit}: give a smaller safe")
+            raise ValueError(f"safe={self.safe} exceeds limit={self.limit}: give a smaller safe")
 
 
 @dataclass(frozen=True, eq=False)

@@ -76,7 +76,8 @@ class _Queued:
         positive("deviation", self.deviation)
         if not self.mean > self.least:
             raise ValueError(
-                f"mean={self.mean} is not above least={self.least}: give a larger mean"
+                f"the mean delay, mean={self.mean}, must be above the least delay, "
+                f"least={self.least}: give a larger mean"
             )
 
 

@@ -31,12 +31,13 @@ LEAST = 0.8
 def delays_of(kind: DelaysName, mean: float, deviation: float) -> Delays:
     """One-way delays of this kind; constant ones without deviation."""
     if kind not in DELAYS:
-        raise ValueError(f"the delays {kind!r} are none of {', '.join(DELAYS)}")
+        raise ValueError(f"delays of kind {kind!r} do not exist: give one of {', '.join(DELAYS)}")
     if deviation == 0.0:
         return Constant(mean)
     if mean == 0.0 and kind != "normal":
         raise ValueError(
-            f"{kind} delays of {mean} s on average cannot vary by {deviation} s: give a longer mean"
+            f"{kind} delays with a mean of {mean} s cannot have a standard deviation of "
+            f"{deviation} s: give a longer mean"
         )
     if kind == "normal":
         return Normal(mean, deviation)
@@ -59,21 +60,21 @@ def network_of(
     delay : float
         Mean one-way delay, s.
     jitter : float
-        Its standard deviation, s.
+        Standard deviation of the one-way delay, s.
     kind : {"gamma", "normal", "lognormal"}
-        Its distribution.
+        Distribution of the one-way delay.
 
         Delays of the first and the last kind begin at 0.8 of the mean.
     loss : float
-        Part of the packets lost.
+        Share of the packets that are lost.
     burst : float
         Mean length of a burst of losses.
 
         In packets; 1 for independent losses.
     duplication : float
-        Part that comes twice.
+        Share of the packets that arrive twice.
     ordered : bool
-        No packet overtakes another.
+        Keep the order of the packets, so that no packet overtakes another.
 
     Examples
     --------
@@ -97,14 +98,14 @@ def policy_of(name: PolicyName = "newest", number: float | None = None) -> Polic
     name : {"newest", "drop-late", "hold", "jitter-buffer"}
         What the plant does with late commands.
     number : float, optional
-        Of the policy: largest age (drop-late), samples held (hold), constant age (jitter-buffer);
-        times in s.
+        Parameter of the policy: largest age in s (drop-late), number of samples (hold), or constant
+        age in s (jitter-buffer).
     """
     if name not in POLICIES:
-        raise ValueError(f"the policy {name!r} is none of {', '.join(POLICIES)}")
+        raise ValueError(f"the policy {name!r} does not exist: give one of {', '.join(POLICIES)}")
     if name == "newest":
         if number is not None:
-            raise ValueError(f"the policy 'newest' takes no parameter: leave {number:g} out")
+            raise ValueError(f"the policy 'newest' has no parameter: leave {number:g} out")
         return NewestWins()
     if number is None:
         what = "a number of samples" if name == "hold" else "a time in s"
@@ -123,7 +124,7 @@ def network_text(network: Network) -> str:
         if type(network.delay) is made:
             words["delay"]["kind"] = kind
     if isinstance(words["delay"], dict) and "kind" not in words["delay"]:
-        raise ValueError(f"the delays {network.delay} cannot be given to another process")
+        raise ValueError(f"the delays {network.delay} cannot be passed to another process")
     return json.dumps(words)
 
 
@@ -152,7 +153,7 @@ def policy_words(policy: Policy) -> tuple[PolicyName, float | None]:
         return "drop-late", policy.older_than
     if isinstance(policy, JitterBuffer):
         return "jitter-buffer", policy.delay
-    raise ValueError(f"{policy} cannot be given to another process")
+    raise ValueError(f"{policy} cannot be passed to another process")
 
 
 def arguments_of(options: ControllerOptions | RelayOptions | PlantOptions) -> list[str]:

@@ -65,12 +65,13 @@ async def open_socket(receive: Callable[[bytes, Address], None], address: Addres
         _, socket = await loop.create_datagram_endpoint(lambda: Socket(receive), local_addr=address)
     except OSError as error:
         raise LinkError(
-            f"no UDP socket on {address[0]}:{address[1]}: {error.strerror or error}; give a port "
-            "that is free, or 0 for any"
+            f"no UDP socket can be opened on {address[0]}:{address[1]}: "
+            f"{error.strerror or error}. Give a port that is free, or 0 for any free port"
         ) from None
     if not is_loopback(address[0]):
         print(
-            f"listening on {address[0]}: every host that reaches this port can send to it",
+            f"the endpoint listens on {address[0]}, so every host that reaches this port can "
+            "send packets to it",
             file=sys.stderr,
         )
     return socket
@@ -95,7 +96,7 @@ async def resolved(address: Address) -> Address:
     host, port = address
     if port == 0:
         raise LinkError(
-            f"port 0 of {host} cannot receive: give the port on which the other end listens"
+            f"nothing can be sent to port 0 of {host}: give the port on which the other end listens"
         )
     try:
         ipaddress.ip_address(host)
@@ -105,7 +106,7 @@ async def resolved(address: Address) -> Address:
             found = await loop.getaddrinfo(host, port)
         except OSError as error:
             raise LinkError(
-                f"the host {host!r} is not known: {error.strerror}; give its address"
+                f"the host {host!r} is not known: {error.strerror}. Give its IPv4 address"
             ) from None
         numeric = [entry[4][0] for entry in found if ":" not in str(entry[4][0])]
         if not numeric:

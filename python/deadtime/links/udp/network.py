@@ -45,7 +45,9 @@ class Bursts:
         for name in ("begin", "end", "good", "bad"):
             _probability(name, getattr(self, name))
         if self.begin > 0.0 and self.end == 0.0:
-            raise ValueError("end=0: the bad state would never end, give a probability above zero")
+            raise ValueError(
+                "end=0: then a burst of losses would never end. Give a probability above zero"
+            )
 
     @property
     def mean(self) -> float:
@@ -58,15 +60,15 @@ class Bursts:
         """Bursts of `length` packets on average that lose this share of all packets."""
         _probability("loss", loss)
         if loss >= 1.0:
-            raise ValueError(f"loss={loss}: give a number below 1")
+            raise ValueError(f"loss={loss}: give a share below 1")
         if not finite("length", length) >= 1.0:
-            raise ValueError(f"length={length}: give at least 1")
+            raise ValueError(f"length={length}: give a mean number of lost packets, at least 1")
         end = 1.0 / length
         begin = end * loss / (1.0 - loss)
         if begin > 1.0:
             raise ValueError(
-                f"bursts of {length:g} packets cannot lose {loss:g} of all packets: make the "
-                "bursts longer"
+                f"with bursts of {length:g} packets, the share of lost packets cannot be "
+                f"{loss:g}: give longer bursts"
             )
         return Bursts(begin, end)
 
@@ -117,7 +119,7 @@ class Network:
         for start, stop in self.blackouts:
             if not finite("blackout", start) < finite("blackout", stop):
                 raise ValueError(
-                    f"the blackout ({start}, {stop}) s is empty: give a start before its end"
+                    f"the blackout ({start}, {stop}) s has no duration: give a start before its end"
                 )
 
     def path(self, seed: int | str) -> Path:
@@ -127,7 +129,7 @@ class Network:
 
 def _probability(name: str, value: float) -> None:
     if not 0.0 <= finite(name, value) <= 1.0:
-        raise ValueError(f"{name}={value}: give a probability, from 0 to 1")
+        raise ValueError(f"{name}={value}: give a probability between 0 and 1")
 
 
 @dataclass

@@ -65,22 +65,22 @@ class PlantOptions:
             positive(name, getattr(self, name))
         if self.watchdog <= self.sample_time:
             raise ValueError(
-                f"watchdog={self.watchdog} s must be longer than sample_time={self.sample_time} s: "
-                "otherwise it trips between any two commands"
+                f"watchdog={self.watchdog} s is not longer than sample_time={self.sample_time} "
+                "s, so it would trip between any two commands: give a longer watchdog"
             )
         buffer = self.policy
         if isinstance(buffer, JitterBuffer) and buffer.delay > self.watchdog:
             raise ValueError(
-                f"{buffer} makes every command older than watchdog={self.watchdog} s: give a "
+                f"with {buffer}, every command is older than watchdog={self.watchdog} s: give a "
                 "shorter delay or a longer watchdog"
             )
         non_negative("rest", self.rest)
         finite("amplitude", self.amplitude)
         if abs(finite("safe", self.safe)) > self.limit:
-            raise ValueError(f"safe={self.safe} is beyond limit={self.limit}: give a smaller safe")
+            raise ValueError(f"safe={self.safe} exceeds limit={self.limit}: give a smaller safe")
         if self.doubles is not None and self.policy.needs_times:
             raise ValueError(
-                f"{self.policy} needs time stamps, but plain doubles have none: use "
+                f"{self.policy} needs time stamps, but packets of plain doubles have none: use "
                 "NewestWins or HoldThenZero"
             )
 

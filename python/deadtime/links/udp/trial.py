@@ -25,15 +25,15 @@ class Trial:
     Parameters
     ----------
     gain : float
-        Of the controller, 1/s.
+        Gain of the controller, 1/s.
     forward_path, return_path : Network
         Network from the plant to the controller, and back.
     seed : int
-        Of delays and losses.
+        Seed of the random delays and losses.
     sample_time : float
         Time between two measurements, s.
     duration : float
-        Duration of the run, s; the reference steps after `rest`.
+        Duration of the run, s. The reference steps after `rest`.
     rest : float
         Time before the step, s.
     plant_gain : float
@@ -41,13 +41,13 @@ class Trial:
     lag : float
         Lag of the plant, s.
     limit : float
-        Largest size of the command.
+        Largest magnitude of the command.
 
         On both sides.
     policy : Policy
         What the plant does with late commands.
     watchdog : float
-        Silence after which each side is safe, s.
+        Time without a packet after which each side goes to its safe state, s.
     safe : float
         The command that is applied after such a silence.
     """

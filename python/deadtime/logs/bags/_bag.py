@@ -122,7 +122,7 @@ class Bag:
             missing; when fewer than 8 rows of the output follow a command.
         """
         if stamps not in (None, "header", "received"):
-            raise ValueError(f"stamps={stamps!r} is not one of 'header', 'received', None")
+            raise ValueError(f"stamps={stamps!r}: give 'header', 'received' or None")
         named = {"command": command, "output": output}
         if reference is not None:
             named["reference"] = reference
@@ -135,7 +135,7 @@ class Bag:
         told, came = series["command"], series["output"]
         for signal, one in series.items():
             if not len(one) or not np.isfinite(one.values).any():
-                raise RecordingError(f"{named[signal]} holds no number in {self.source}")
+                raise RecordingError(f"{named[signal]} contains no number in {self.source}")
         name = f"{self.source}, {why}"
         return recording_of(name, series.get("reference"), came, told, (None, None))
 
@@ -145,13 +145,11 @@ class Bag:
         known = self.topics.get(topic)
         if known is None:
             has = ", ".join(map(printable, self.topics)) or "none"
-            raise RecordingError(f"{self.source} has no topic {topic!r}: its topics are {has}")
+            raise RecordingError(f"{self.source} has no topic {topic!r}. Its topics are {has}")
         if not colon or path not in known.fields:
-            has = ", ".join(map(printable, known.fields)) or "none that is a number"
-            wanted = (
-                f"no field {path!r}" if colon else "several fields, of which one is to be named"
-            )
-            raise RecordingError(f"{topic} in {self.source} has {wanted}: {has}")
+            has = ", ".join(map(printable, known.fields)) or "no field that is a number"
+            wanted = f"no field {path!r}" if colon else "several fields, so one has to be named"
+            raise RecordingError(f"{topic} in {self.source} has {wanted}. Its fields are {has}")
         return topic, path
 
     def _rows(self, places: Mapping[str, tuple[str, str]]) -> dict[str, _Rows]:
@@ -228,16 +226,21 @@ def _stamps(
     without = sorted({places[signal][0] for signal, one in rows.items() if not one.has_stamps})
     if without and asked == "header":
         raise RecordingError(
-            f"the headers of {', '.join(without)} contain no time: use stamps='received'"
+            f"the headers of {', '.join(without)} contain no time, so stamps='header' is not "
+            "possible: give stamps='received'"
         )
     if asked is not None:
-        return asked, f"by the times {_of(asked)}, as asked for"
+        return asked, f"by the times {_of(asked)}, which were asked for"
     if without:
-        return "received", f"by the times of reception, since {', '.join(without)} has no other"
+        return "received", (
+            f"by the times of reception, because {', '.join(without)} has no other times"
+        )
     ages = [one.age() for one in rows.values()]
     if max(ages) - min(ages) > ONE_CLOCK:
-        return "received", "by the times of reception, since the headers are of different clocks"
-    return "header", "by the times in the headers, which all topics have"
+        return "received", (
+            "by the times of reception, because the times in the headers come from different clocks"
+        )
+    return "header", "by the times in the headers, because all topics have these times"
 
 
 def _of(stamps: Stamps) -> str:

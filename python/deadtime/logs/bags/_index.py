@@ -66,4 +66,4 @@ class Index:
         """A sentence about topics that cannot be decoded."""
         if not self.undecoded:
             return []
-        return [f"not decoded, because the encoding is not known: {', '.join(self.undecoded)}"]
+        return [f"not decoded, because their encoding is not known: {', '.join(self.undecoded)}"]

@@ -131,7 +131,7 @@ def read_mcap(path: str | os.PathLike[str]) -> Bag:
     index.fill(file.messages(), lambda topic: file.types[topic])
     remarks = index.remarks()
     if file.cut:
-        remarks.append("the file is cut off or damaged, and is read as far as it goes")
+        remarks.append("the file is cut off or damaged, so it is read only up to this place")
     if file.lost:
         remarks.append(f"{file.lost} damaged chunks are left out")
     ends = index.ends or (0, 0)

@@ -84,12 +84,14 @@ def open_bag(path: str | os.PathLike[str]) -> Bag:
     if _is_folder(path):
         return read_ros(path, "ROS 2 bag")
     if path.is_dir():
-        raise RecordingError(f"{path} is a folder without the {DESCRIPTION} of a bag of ROS 2")
+        raise RecordingError(
+            f"{path} is a folder without the file {DESCRIPTION}, so it is not a bag of ROS 2"
+        )
     with opened(path) as stream:
         head = stream.read(HEAD)
     form = format_of(path, head, "open_bag")
     if form is None:
         raise RecordingError(
-            f"{path} is not a bag: MCAP files and bags of ROS 1 and ROS 2 can be read"
+            f"{path} is not a bag. Only MCAP files and bags of ROS 1 and ROS 2 can be read"
         )
     return read_mcap(path) if form == "MCAP" else read_ros(path, form)

@@ -60,7 +60,7 @@ def read_ros(path: str | os.PathLike[str], form: str) -> Bag:
     file = _RosBag(Path(path))
     if not file.path.is_dir() and file.path.suffix != ENDINGS[form]:
         raise RecordingError(
-            f"{path} is a {form}: rename the file so that its name ends in {ENDINGS[form]}"
+            f"{path} is a {form}, but its name does not end in {ENDINGS[form]}: rename the file"
         )
     index = Index()
     index.fill(file.messages(), lambda topic: file.types[topic])
@@ -68,7 +68,7 @@ def read_ros(path: str | os.PathLike[str], form: str) -> Bag:
     if file.damage is not None:
         if index.ends is None:
             why = printable(f"{type(file.damage).__name__}: {file.damage}")
-            raise RecordingError(f"{path} is a damaged {form}: reading it ended with {why}")
-        remarks.append("the bag is cut off or damaged, and is read as far as it goes")
+            raise RecordingError(f"{path} is a damaged {form}, and reading it ended with {why}")
+        remarks.append("the bag is cut off or damaged, so it is read only up to this place")
     ends = index.ends or (0, 0)
     return bag_of(file.path.name, form, index.topics(), ends, file.messages, remarks)

@@ -107,14 +107,15 @@ def _flown(loop: LogLoop, facts: Facts) -> str:
     promise = facts.promises[loop.name]
     if not math.isfinite(promise.stderr):
         return (
-            f"{loop.name}: move its setpoint; in this log the response follows almost no part of it"
+            f"{loop.name}: move the setpoint, because in this log the response follows "
+            "almost no part of it"
         )
     more = max(promise.changes, 1.0) * (share_of(promise) / WANTED) ** 2
     count = int(min(max(math.ceil(more), FEWEST), MOST))
     held = shown(HELD * promise.time, promise.time, "s")
     return (
-        f"{loop.name}: fly {count} quick changes of different sizes, each held for {held} or more; "
-        f"now {promise.short()}"
+        f"{loop.name}: fly {count} quick changes of the setpoint with different sizes, and hold "
+        f"each for {held} or longer. This log gives {promise.short()}"
     )
 
 
@@ -141,15 +142,22 @@ def _sampled(facts: Facts) -> str:
     steps = max(facts.settings.get("pid_process_denom", 1.0), 1.0)
     period = 1e-6 * facts.settings.get("looptime", 125.0) * steps
     share = 2 ** max(0, min(4, math.floor(math.log2(max(1.0 / (period * BLACKBOX), 1.0)))))
-    return f"set blackbox_sample_rate = 1/{share}: {1.0 / (period * share):.0f} rows a second"
+    return (
+        f"set blackbox_sample_rate = 1/{share}, to log {1.0 / (period * share):.0f} rows per second"
+    )
 
 
 def _ardupilot(facts: Facts) -> Said:
     if facts.is_slow and facts.plane and facts.lacks("LOG_BITMASK", FULL_RATE):
-        words = f"{_with('LOG_BITMASK', FULL_RATE, facts)}: attitude in each loop"
+        words = (
+            f"{_with('LOG_BITMASK', FULL_RATE, facts)}, to log the attitude in each cycle of the "
+            "loop"
+        )
         yield words, "ArduPilot: Parameters, LOG_BITMASK"
     elif facts.is_slow and not facts.plane and facts.lacks("LOG_BITMASK", FAST):
-        words = f"{_with('LOG_BITMASK', FAST, facts)}: fast attitude, ATT and RATE in each loop"
+        words = (
+            f"{_with('LOG_BITMASK', FAST, facts)}, to log ATT and RATE in each cycle of the loop"
+        )
         yield words, "ArduPilot: Parameters, LOG_BITMASK"
     most = facts.settings.get("LOG_FILE_RATEMAX", 0.0)
     if facts.is_slow and most > 0.0:
@@ -158,7 +166,10 @@ def _ardupilot(facts: Facts) -> Said:
     if facts.worst(*SID_AXES) is not None and facts.version >= SYSTEM_ID and not facts.plane:
         yield _sid(facts), "ArduPilot: System ID Mode Operation"
     if facts.lacks("LOG_BITMASK", RAW_IMU) and any(one.kind == "rate" for one in facts.loops):
-        words = f"{_with('LOG_BITMASK', FAST | RAW_IMU, facts)}: raw IMU too, as filters see it"
+        words = (
+            f"{_with('LOG_BITMASK', FAST | RAW_IMU, facts)}, to log also the raw IMU that the "
+            "filters read"
+        )
         yield words, "ArduPilot: Measuring Vibration with IMU Batch Sampler"
 
 
@@ -167,14 +178,15 @@ def _px4(facts: Facts) -> Said:
         return
     if facts.lacks("SDLOG_PROFILE", HIGH_RATE):
         yield (
-            f"{_with('SDLOG_PROFILE', DEFAULT_SET | HIGH_RATE, facts)}: rates, attitude and "
-            "actuators each time they are computed",
+            f"{_with('SDLOG_PROFILE', DEFAULT_SET | HIGH_RATE, facts)}, to log rates, attitude "
+            "and actuators whenever they are computed",
             "PX4: Logging, SDLOG_PROFILE",
         )
     if facts.lacks("SDLOG_PROFILE", IDENTIFICATION | HIGH_RATE):
         yield (
-            "if the card is too slow for that, "
-            f"{_with('SDLOG_PROFILE', DEFAULT_SET | IDENTIFICATION, facts)}: actuators and IMU",
+            "if the card is too slow for this, "
+            f"{_with('SDLOG_PROFILE', DEFAULT_SET | IDENTIFICATION, facts)}, to log only "
+            "actuators and IMU",
             "PX4: Logging, SDLOG_PROFILE",
         )
     mode = facts.settings.get("SDLOG_MODE", 0.0)
@@ -190,21 +202,25 @@ def _betaflight(facts: Facts) -> Said:
     if missing := _missing(facts):
         words = ", ".join(f"set blackbox_disable_{name} = OFF" for name in missing)
         if facts.version < FIELDS:
-            words = f"this firmware logs no {', '.join(missing)}: update to 4.3 or later"
+            words = (
+                f"this firmware does not log {', '.join(missing)}: update to version 4.3 or later"
+            )
         yield words, "Betaflight: CLI commands, blackbox_disable_*"
     if _is_rare(facts):
         yield _sampled(facts), "Betaflight: CLI commands, blackbox_sample_rate"
     if facts.version >= CHIRP:
         yield (
             "set debug_mode = CHIRP, chirp_amplitude_roll = 230, chirp_amplitude_pitch = 230, "
-            "chirp_amplitude_yaw = 180, chirp_time_seconds = 20; fly with CHIRP on a switch",
+            "chirp_amplitude_yaw = 180, chirp_time_seconds = 20, and fly with CHIRP on a switch",
             "Betaflight: 2025.12 Release Notes, Chirp",
         )
 
 
 def _inav(facts: Facts) -> Said:
     if _is_rare(facts):
-        words = "set blackbox_rate_num = 1, blackbox_rate_denom = 1: each loop is logged"
+        words = (
+            "set blackbox_rate_num = 1 and blackbox_rate_denom = 1, to log each cycle of the loop"
+        )
         yield words, "INAV: Blackbox"
 
 
@@ -217,12 +233,14 @@ def _crazyflie(facts: Facts) -> Said:
     page = "Bitcraze: Micro SD card deck"
     if not facts.log.loops:
         yield (
-            "log setpoints beside responses: controller.rollRate and gyro.x, controller.roll "
-            "and stateEstimate.roll, ctrltarget.z and stateEstimate.z",
+            "log each setpoint with its response: controller.rollRate and gyro.x, "
+            "controller.roll and stateEstimate.roll, ctrltarget.z and stateEstimate.z",
             page,
         )
     if facts.is_slow or not facts.log.loops:
-        words = "on:fixedFrequency, 500, 1 in config.txt: 500 Hz, at the loop of the stabilizer"
+        words = (
+            "on:fixedFrequency, 500, 1 in config.txt, to log at 500 Hz, the rate of the stabilizer"
+        )
         yield words, page
 
 

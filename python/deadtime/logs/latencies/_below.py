@@ -151,13 +151,13 @@ def _spread(loops: Sequence[LoopLatency]) -> str:
         _, (change, error), one = max(slopes, key=lambda each: each[0])
         way = "longer" if change > 0.0 else "less"
         return (
-            f"{names_of([one])} takes {stated(abs(change), error, 's')} {way} where the "
+            f"{names_of([one])} takes {stated(abs(change), error, 's')} {way} if the "
             f"{one.command} moves half as much"
         )
     if differ:
         _, between, one = max(differ, key=lambda each: each[0])
         return (
-            f"{names_of([one])}: the time differs over the log, by {about(between, 's')} "
-            "(standard deviation between windows)"
+            f"{names_of([one])}: the time changes during the log, with a standard deviation of "
+            f"{about(between, 's')} between windows"
         )
     return ""

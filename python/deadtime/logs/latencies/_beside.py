@@ -79,8 +79,8 @@ def _why_ahead(one: PlainTime) -> str:
     low, high = one.interval
     error = 0.25 * (high - low)
     return (
-        f"by {one.name} the response precedes its setpoint by {shown(-one.value, error, 's')} "
-        f"(95 %: {ends_of(-high, -low, error, 's')})"
+        f"by {one.name} the response comes {shown(-one.value, error, 's')} before "
+        f"its setpoint (95 %: {ends_of(-high, -low, error, 's')})"
     )
 
 
@@ -95,6 +95,6 @@ def _why_apart(one: Difference, half: float) -> str:
         return ""
     error = 0.25 * (high - low)
     return (
-        f"by {one.name} {CONTRADICTED} {shown(one.measured, error, 's')} and the fit "
-        f"{shown(one.modelled, error, 's')}"
+        f"by {one.name} {CONTRADICTED} {shown(one.measured, error, 's')}, but the "
+        f"fit gives {shown(one.modelled, error, 's')}"
     )

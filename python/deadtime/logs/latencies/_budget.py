@@ -67,7 +67,7 @@ def stages_of(
     own = {one.command: one for one in relations if one.loop == loop and one.verdict != "none"}
     stages = []
     if "setpoint" in own:
-        stages.append(_measured(own["setpoint"], "setpoint to response, loop closed"))
+        stages.append(_measured(own["setpoint"], "setpoint to response, with the loop closed"))
     if "actuator" not in own:
         return tuple(stages)
     vehicle = own["actuator"]

@@ -68,11 +68,11 @@ class LatencyChange:
     def outcome(self) -> str:
         """Whether the difference is real, in words."""
         if self.verdict != "reliable":
-            return "not known: an estimate is an indication"
+            return "not known, because one of the two estimates is only an indication"
         if self.p_value >= REAL:
-            return f"no difference is seen (p = {self.p_value:.2g})"
+            return f"no difference was found (p = {self.p_value:.2g})"
         way = "longer" if self.change > 0.0 else "shorter"
-        return f"really {way} (p = {self.p_value:.2g})"
+        return f"{way}, and not by chance (p = {self.p_value:.2g})"
 
     def to_dict(self) -> dict[str, Any]:
         """The change as plain values for JSON."""

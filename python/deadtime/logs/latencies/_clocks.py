@@ -93,18 +93,18 @@ def why_two_clocks(found: LoopLatency, command: Stamped, response: Stamped) -> s
         by = stated(grows.value, grows.error, "s")
         error = math.hypot(grows.start_error, (high - low) / TWO_SIDED)
         first = stated(found.time + grows.start, error, "s")
-        also = f", whose stamps do so by {1e6 * abs(apart):.3g} ppm" if apart else ""
+        also = f", whose time stamps drift apart by {1e6 * abs(apart):.3g} ppm" if apart else ""
         return (
-            f"the time from command to response grows by {by} each second; it was {first} when the "
-            f"log began. Either {names} are stamped by clocks that drift apart{also}, or the "
-            "vehicle changes"
+            f"the time from command to response grows by {by} each second, from {first} at the "
+            f"start of the log. Either the clocks of {names} drift apart{also}, or the vehicle "
+            "changes"
         )
     if abs(apart) * length <= worth or not (grows is None or grows.may_be(apart)):
         return ""
     return (
-        f"the stamps of {names} drift apart by {1e6 * abs(apart):.3g} ppm: if they are those of "
-        f"two clocks, the time is wrong by {stated(abs(apart), 0.0, 's')} for each second since "
-        "both agreed"
+        f"the time stamps of {names} drift apart by {1e6 * abs(apart):.3g} ppm. If they come "
+        f"from two clocks, the time is wrong by {stated(abs(apart), 0.0, 's')} for each second "
+        "since the two clocks agreed"
     )
 
 

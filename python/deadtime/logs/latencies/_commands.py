@@ -57,14 +57,14 @@ def period_of(log: Log, kind: Kind) -> Period | None:
     if log.autopilot == "PX4" and kind in ("velocity", "position"):
         return Period(1.0 / PX4_OUTER, f"at least {PX4_OUTER:g} Hz", True)
     if log.autopilot == "Crazyflie":
-        return Period(1.0 / CRAZYFLIE[kind], f"{CRAZYFLIE[kind]:g} Hz of the firmware")
+        return Period(1.0 / CRAZYFLIE[kind], f"{CRAZYFLIE[kind]:g} Hz, the rate of the firmware")
     for name in ("SCHED_LOOP_RATE", "IMU_GYRO_RATEMAX"):
         if told.get(name, 0.0) > 0.0:
             return Period(1.0 / told[name], f"{name} {told[name]:g}")
     steps = max(told.get("pid_process_denom", 1.0), 1.0)
     if log.autopilot in ("Betaflight", "INAV") and told.get("looptime", 0.0) > 0.0:
         time = told["looptime"] * steps
-        return Period(1e-6 * time, f"looptime {told['looptime']:g} µs, times {steps:g}")
+        return Period(1e-6 * time, f"looptime of {told['looptime']:g} µs, times {steps:g}")
     return None
 
 

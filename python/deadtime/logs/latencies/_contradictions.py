@@ -38,6 +38,7 @@ def _by_axes(one: LoopLatency, reliable: list[LoopLatency]) -> Iterator[str]:
         (low, high), (least, most) = one.interval, other.interval
         if max(low, least) > APART * min(high, most):
             yield (
-                f"{one.axis} and {other.axis} contradict each other: their times are "
-                f"{stated(one.time, one.stderr, 's')} and {stated(other.time, other.stderr, 's')}"
+                f"{one.axis} and {other.axis} contradict each other, because their times are "
+                f"{stated(one.time, one.stderr, 's')} and "
+                f"{stated(other.time, other.stderr, 's')}"
             )

@@ -50,24 +50,36 @@ def half_of_step(grid: Grid, longest: float) -> tuple[float, Array, int, str]:
     crosses, powers = _spectra(grid, longest)
     count = len(powers)
     if count == 0:
-        return math.nan, np.empty(0), 0, "no segment is long enough"
+        return math.nan, np.empty(0), 0, "no part of the log is long enough"
     cross, power = crosses.sum(axis=0), powers.sum(axis=0)
     if not float(np.max(power)) > 0.0:
         return math.nan, np.empty(0), count, "the setpoint does not move"
     time, own = _step(power, power, grid.step, longest)
     if float(np.max(np.abs(own[time >= 0.5 * longest] - 1.0))) > FLAT:
-        return math.nan, np.empty(0), count, "the setpoint moves at too few frequencies for a step"
+        return (
+            math.nan,
+            np.empty(0),
+            count,
+            ("the setpoint moves at too few frequencies to compute a step response"),
+        )
     found = _half(cross, power, grid.step, longest)
     rise = float(np.sum((own > RISE[0]) & (own < RISE[1]))) * grid.step
     if rise > found:
-        why = f"the step of the setpoint itself rises over {stated(rise, 0.0, 's')}, which hides it"
+        why = (
+            f"the computed step of the setpoint rises over {stated(rise, 0.0, 's')}, which is "
+            "too slow to read a time"
+        )
         return math.nan, np.empty(0), count, why
     groups = np.array_split(np.arange(count), min(BLOCKS, count))
     without = [
         _half(cross - crosses[k].sum(axis=0), power - powers[k].sum(axis=0), grid.step, longest)
         for k in (groups if len(groups) > 1 else ())
     ]
-    why = "the deconvolved step does not rise to a level" if math.isnan(found) else ""
+    why = (
+        ("the deconvolved step response does not come to rest at a level")
+        if math.isnan(found)
+        else ""
+    )
     return found, np.array(without), count, why
 
 

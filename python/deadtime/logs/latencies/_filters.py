@@ -216,7 +216,7 @@ def _betaflight(told: Mapping[str, float]) -> list[FilterDelay]:
     quality, lowest = told.get("dyn_notch_q", 0.0) / 100.0, told.get("dyn_notch_min_hz", 0.0)
     count = told.get("dyn_notch_count", 1.0)
     if quality > 0.0 and lowest > 0.0 and count > 0.0:
-        source = f"dyn_notch_min_hz {lowest:g}, dyn_notch_q {100.0 * quality:g}, {count:g} of them"
+        source = f"dyn_notch_min_hz {lowest:g}, dyn_notch_q {100.0 * quality:g}, {count:g} notches"
         delay = count * notch(lowest, quality)
         found.append(FilterDelay("dynamic notch, at most", "response", delay, source))
     return found

@@ -45,7 +45,8 @@ WIDE = 0.5
 
 #: Where a recording of few moves belongs.
 OF_A_PROCESS = Advice(
-    "of a bump test, deadtime estimate finds the dead time, and deadtime tune gains", ""
+    "for a bump test, `deadtime estimate` finds the dead time, and `deadtime tune` proposes gains",
+    "",
 )
 
 #: A function that is called with the time of each loop, or whether to print them.
@@ -97,7 +98,7 @@ class Latency(ReadOnlyArrays, Pictured):
                 return one
         has = ", ".join(f"{one.loop!r} from {one.command}" for one in self.loops) or "none"
         raise ValueError(
-            f"{name!r} has no time from its {command} to its response: there are times for {has}"
+            f"{name!r} has no time from its {command} to its response. There are times for {has}"
         )
 
     @property
@@ -331,13 +332,13 @@ def _sent_from_the_ground(log: Log, loops: list[LogLoop]) -> list[str]:
         return []
     half = log.link.half_round_trip
     long = (
-        "which this log does not show"
+        "but this log does not show how long"
         if half is None
         else f"at least {stated(2.0 * half, 0.0, 's')}"
     )
     return [
-        f"{', '.join(names)}: the setpoint is stamped where it was sent, on the ground; its time "
-        f"to the response holds the link there and back, {long}"
+        f"{', '.join(names)}: the setpoint has the time at which the ground sent it. So the "
+        f"time to the response contains the way over the link and back, {long}"
     ]
 
 
@@ -352,7 +353,7 @@ def _chosen(log: Log, axes: Iterable[str] | None, names: Iterable[str] | None) -
         for one in asked:
             if one not in has:
                 raise ValueError(
-                    f"{log.source} has no loop with the {what} {one!r}, it has "
+                    f"{log.source} has no loop with the {what} {one!r}. It has "
                     f"{', '.join(has) or 'none'}"
                 )
         found = [loop for loop in found if getattr(loop, what) in asked]
@@ -366,7 +367,7 @@ def loops_asked_for(
     if isinstance(log, Recording):
         if axes is not None or loops is not None:
             raise ValueError(
-                f"{log.source or 'the recording'} has only one loop: give no axis and no loop"
+                f"{log.source or 'the recording'} has only one loop: leave axis and loop out"
             )
         return [(_name_of(log), "setpoint" if log.command is None else "actuator")]
     return [(loop.name, one) for loop in _chosen(log, axes, loops) for one in _commands(loop)]
@@ -379,8 +380,8 @@ def _reported(
     if not isinstance(progress, bool):
         if not callable(progress):
             raise TypeError(
-                f"progress={progress!r}: give True to print each time, or a function that "
-                "takes the time"
+                f"progress={progress!r}: give True to print each time, or a function that takes "
+                "each time"
             )
         return progress
     if not progress:
@@ -430,7 +431,7 @@ def _commands(loop: LogLoop) -> Iterator[Command]:
 def latency_of(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
     """The time of one loop from one of its commands."""
     if not loop.segments:
-        why = "; ".join(loop.why_left_out) or "the setpoint is never followed"
+        why = "; ".join(loop.why_left_out) or "the response never follows its setpoint"
         return LoopLatency(loop.name, loop.axis, loop.kind, command, "none", why)
     told = loop.signals[command]
     sampling = sampling_of(log, loop.kind, told)
@@ -471,7 +472,10 @@ def _of_recording(recording: Recording) -> Latency:
     further: tuple[Advice, ...] = ()
     count = len(moving_of(parts))
     if one.verdict == "none" and count < min(FEW, len(parts)):
-        why = f"the {command} moves in {count} of {len(parts)} parts, and a time needs {FEW}"
+        why = (
+            f"the {command} moves in {count} of {len(parts)} parts of the recording, but a time "
+            f"needs {FEW}"
+        )
         one, further = replace(one, reason=why), (OF_A_PROCESS,)
     if recording.sent is not None and one.verdict != "none":
         clocks = (("the commands", recording.sent.time), ("the rows", recording.time))

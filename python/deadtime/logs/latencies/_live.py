@@ -46,11 +46,12 @@ def around_the_vehicle(estimated: Sequence[LoopLatency]) -> Around | None:
     assert one.estimate is not None
     assert one.cost is not None
     gain = _flown(one)
-    which = "the gain that is flown" if gain is not None else "the well damped gain"
+    which = "the gain that the vehicle uses" if gain is not None else "the well damped gain"
     words = (
-        f"The vehicle as estimated, {one.name}, under proportional control of the {one.loop} with "
-        f"{which}: its largest stable gain refers to this loop, without further terms of the "
-        "controller. The interval is that of the delay, with gain and lag as estimated."
+        f"Loop: the vehicle as estimated ({one.name}), with a proportional controller of the "
+        f"{one.loop} that has {which}. The largest stable gain is for this loop, without other "
+        "terms of the controller. The interval is for the delay, with gain and lag as "
+        "estimated."
     )
     controller = P(one.cost.well_damped if gain is None else gain)
     widest, longest = (float(f"{_BEYOND * end:.2g}") for end in (one.cost.largest, one.time))

@@ -130,10 +130,13 @@ class Moves(ReadOnlyArrays):
         """The time in one line."""
         if self.reason:
             return f"none: {self.reason}"
-        known = f"{self.count} moves, half to half"
+        known = f"{self.count} moves, from half of the setpoint's change to half of the response"
         low, high = self.interval
         if math.isnan(low):
-            return f"{known} {stated(self.median, 0.0, 's')}, too few for an interval"
+            return (
+                f"{known} {stated(self.median, 0.0, 's')}, but there are too few moves for an "
+                "interval"
+            )
         error = 0.25 * (high - low)
         covered = f"{100.0 * self.coverage:.0f} %"
         return (
@@ -205,7 +208,7 @@ def aligned(
     """Any response, such as that of a fitted plant, to moves that were found before."""
     if not moves:
         empty = np.empty(0)
-        why = "the setpoint never moves from one rest to another by more than the noise"
+        why = "the setpoint never moves from rest to rest by more than the noise"
         nothing = (math.nan, math.nan)
         return Moves(
             empty, empty, empty, empty, empty, np.empty((0, 0)), empty, empty, empty,
@@ -224,7 +227,7 @@ def aligned(
     reason = ""
     if not math.isfinite(median):
         answered = int(np.count_nonzero(np.isfinite(times)))
-        reason = f"the response answers to {answered} of {len(moves)} moves of the setpoint"
+        reason = f"the response follows {answered} of {len(moves)} moves of the setpoint"
         median, interval, coverage = math.nan, (math.nan, math.nan), math.nan
     return Moves(
         time, _quartiles(np.stack(asked))[1], middle, lower, upper, responses, times, sizes,

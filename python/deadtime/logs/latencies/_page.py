@@ -32,7 +32,7 @@ def fit_of(
     """
     start, stop = one.windows[0]
     number = len(one.windows)
-    more = f", the best of {number} that were fitted together" if number > 1 else ""
+    more = f", the best of {number} windows that were fitted together" if number > 1 else ""
     _, command, time, ends, verdict, seen, *_ = cells_of(one)
     held = f"95 %: {ends}" if ends else NOT_CLAIMED
     return {
@@ -55,9 +55,9 @@ def moves_of_page(moves: Moves, fitted: Moves | None = None) -> dict[str, object
         figure, of_fit = plot_moves(moves), ""
     else:
         figure = plot_moves(moves, fitted.median, fitted.response)
-        of_fit = f"; the fit, at the same rows, {moves.shown(fitted.median)}"
+        of_fit = f". For the fit, at the same rows, it is {moves.shown(fitted.median)}"
     caption = sentence(f"{moves.headline()}{of_fit}")
-    drawn = "Thin: the response to each move, as a share of the change; band: quartiles."
+    drawn = "Thin lines: the response to each move, as a share of the change. Band: quartiles."
     return {"figure": figure, "caption": f"{caption} {drawn}"}
 
 

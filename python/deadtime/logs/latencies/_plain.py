@@ -203,9 +203,9 @@ def plain_times(
         found = moves_of(setpoint, response, segments, longest=longest, between=between)
     else:
         found = aligned(moves, setpoint, response, between=between)
-    few = "" if np.isfinite(found.interval[0]) else "too few moves for an interval"
+    few = "" if np.isfinite(found.interval[0]) else "there are too few moves for an interval"
     of_moves = PlainTime(
-        "moves", "delay and 0.69 lag after jumps, delay and lag after ramps", found.median,
+        "moves", "delay + 0.69 lag after jumps, delay + lag after ramps", found.median,
         found.interval, math.nan, found.count, found.reason or few, found.times,
     )  # fmt: skip
     return PlainTimes(_by_correlation(grid, longest), _by_step(grid, longest), of_moves, found)
@@ -242,7 +242,7 @@ def differences(measured: PlainTimes, modelled: PlainTimes) -> tuple[Difference,
 
 def _by_correlation(grid: Grid, longest: float) -> PlainTime:
     """The peak of the masked cross-correlation."""
-    name, meaning = "cross-correlation", "equivalent delay where the setpoint has its power"
+    name, meaning = "cross-correlation", "equivalent delay at the frequencies of the setpoint"
     found = correlation_of(grid, longest)
     value, height = peak_of(found.lags, found.coefficient)
     rows = independent_rows(grid, longest)
@@ -252,14 +252,14 @@ def _by_correlation(grid: Grid, longest: float) -> PlainTime:
         return PlainTime(name, meaning, math.nan, (math.nan, math.nan), height, blocks, why)
 
     if math.isnan(height) or rows <= ABOVE:
-        return none("setpoint or response does not move for long enough")
+        return none("the setpoint or the response moves too little")
     if height < ABOVE / math.sqrt(rows):
         return none(
-            f"a correlation of {height:.2f} may be chance: setpoint and response move so "
-            f"slowly that the rows equal only {rows:.0f} independent ones"
+            f"a correlation of {height:.2f} may be chance, because both signals move so slowly "
+            f"that the rows count only as {rows:.0f} independent rows"
         )
     if math.isnan(value):
-        return none("the correlation is largest at the end of the times that are searched")
+        return none("the correlation is largest at the longest time that is tried")
     parts = np.array([peak_of(found.lags, one)[0] for one in found.without])
     return _with_interval(name, meaning, value, parts, height, blocks, longest)
 
@@ -279,10 +279,10 @@ def _with_interval(
     """The number with its interval, or none where its scatter is as wide as what is looked for."""
     low, high = _interval(value, parts)
     if math.isnan(low):
-        few = "too few parts for an interval"
+        few = "there are too few parts for an interval"
         return PlainTime(name, meaning, value, (low, high), quality, count, few, parts)
     if 0.5 * (high - low) > WIDEST * longest:
-        why = "its parts contradict one another"
+        why = "the parts of the log contradict one another"
         return PlainTime(name, meaning, math.nan, (math.nan, math.nan), quality, count, why)
     return PlainTime(name, meaning, value, (low, high), quality, count, "", parts)
 

@@ -29,7 +29,7 @@ ROOM = 0.3
 def plot_latency(source: str, told: Sequence[LoopLatency]) -> Figure:
     """The time of each loop as a bar, with its 95 % interval."""
     if not told:
-        raise ValueError(f"{source}: no loop has a time, so nothing is drawn")
+        raise ValueError(f"{source}: no loop has a time, so there is nothing to draw")
     figure, ax = new_figure(7.5, AROUND + ROW * len(told))
     unit, factor = time_unit(float(np.median([one.time for one in told])))
     for place, one in enumerate(told):
@@ -95,7 +95,7 @@ def plot_moves(
         ax.set_xlim(time[known][0], time[known][-1])
         low = min(0.0, float(np.nanmin(moves.lower))) - ROOM
         ax.set_ylim(low, max(1.0, float(np.nanmax(moves.upper))) + ROOM)
-    ax.set_xlabel(f"time from half of the change of the setpoint [{unit}]")
+    ax.set_xlabel(f"time after half of the setpoint's change [{unit}]")
     ax.set_ylabel("share of the change")
     figure.legend(loc="outside upper left", ncols=2, frameon=False, fontsize="small")
     return figure
@@ -112,7 +112,7 @@ def plot_fit(one: LoopLatency) -> Figure:
     if one.command == "setpoint":
         ax.step(recording.time, recording.reference, where="post", **REFERENCE, label="setpoint")
     ax.plot(recording.time, fit.fitted, color=COLOURS[1], lw=1.4, label="fit")
-    ax.set_xlabel("time from the start of the log [s]")
+    ax.set_xlabel("time after the start of the log [s]")
     ax.set_ylabel(f"{one.loop} [{unit}]" if unit else one.loop)
     figure.legend(loc="outside upper center", ncols=3, frameon=False)
     return figure

@@ -76,7 +76,7 @@ class Promise:
     def line(self) -> str:
         """The error in one line."""
         if not math.isfinite(self.stderr):
-            return "there is no time: the response does not follow the setpoint in these rows"
+            return "the response does not follow the setpoint in these rows, so there is no time"
         return f"{self.short()} with these rows"
 
     def to_dict(self) -> dict[str, Any]:

@@ -227,7 +227,7 @@ def relation_of(
     it is fitted, `sampling` how its commands pass between rows then.
     """
     if not windows:
-        return replace(nothing, reason="the setpoint is never followed for long enough")
+        return replace(nothing, reason="the response never follows its setpoint for long enough")
     windows = that_follow(windows)
     chosen = best_of(windows)
     if not chosen:
@@ -307,8 +307,8 @@ def _why_doubtful(found: LoopLatency) -> str:
     needed = MANY if _is_coloured(fit) else FEW
     if len(found.times) < needed:
         return (
-            f"too few windows determine the time by themselves: {len(found.times)}, but {needed} "
-            "are needed"
+            f"a time needs {needed} windows that determine the time alone, but there are only "
+            f"{len(found.times)}"
         )
     return "" if fit.verdict == "reliable" or fit._code in (*OF_THE_GAIN, NOT_WHITE) else fit.reason
 
@@ -408,14 +408,17 @@ def _no_answer(found: LoopLatency) -> str:
     fit = found.estimate
     assert fit is not None
     if fit.best.parameters["gain"] <= 0.0:
-        return f"the response moves against its command (gain {fit.best.parameters['gain']:.3g})"
+        return (
+            "the response moves in the opposite direction of its command (gain "
+            f"{fit.best.parameters['gain']:.3g})"
+        )
     if found.interval[1] <= 0.0 or found.time <= 0.0:
         ahead = rough(-found.time, "s")
-        return f"the response comes {ahead} before its command: it follows something else"
+        return f"the response comes {ahead} before its command, so it follows something else"
     if fit.verdict == "none" and len(found.times) < FEW:
         # Only windows that agree show the time of a plant which the log does not determine.
         return fit.reason
     if not _says_something(found.time, found.stderr, fit.recording):
         value = stated(found.time, found.stderr, "s")
-        return f"the time is estimated as {value}, which cannot be used"
+        return f"the estimated time, {value}, is too uncertain"
     return ""

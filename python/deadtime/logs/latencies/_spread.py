@@ -69,15 +69,18 @@ class Spread:
     def line(self) -> str:
         """The spread in one line."""
         if math.isnan(self.interval[0]):
-            return f"{self.count} windows, which is too few for the spread between them"
+            return f"{self.count} windows are too few to estimate the spread between windows"
         text = (
-            f"{self.count} windows: {stated(self.mean, self.stderr, 's')} "
-            f"(95 %: {ends_of(*self.interval, self.stderr, 's')}), "
-            f"{rough(self.between, 's')} between windows"
+            f"{self.count} windows with a mean of {stated(self.mean, self.stderr, 's')} (95 %: "
+            f"{ends_of(*self.interval, self.stderr, 's')}) and a standard deviation of "
+            f"{rough(self.between, 's')}"
         )
         if (halved := self.halved()) is not None:
             way = "longer" if halved[0] > 0.0 else "shorter"
-            text += f"; {stated(abs(halved[0]), halved[1], 's')} {way} where it moves half as much"
+            text += (
+                f". The time is {stated(abs(halved[0]), halved[1], 's')} {way} if the command "
+                "moves half as much"
+            )
         return text
 
     def halved(self) -> tuple[float, float] | None:
@@ -145,7 +148,7 @@ def spread_of(
     if time.ndim != 1 or not time.shape == error.shape == size.shape:
         raise ValueError(
             f"times, errors and sizes have the shapes {time.shape}, {error.shape} and "
-            f"{size.shape}: give one of each for every window"
+            f"{size.shape}: give one value of each for every window"
         )
     kept = np.isfinite(time) & np.isfinite(error) & (error > 0.0)
     time, error, size = time[kept], error[kept], size[kept]

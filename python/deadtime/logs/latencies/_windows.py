@@ -190,7 +190,9 @@ def prepared(part: Recording, kind: Kind, sampling: Sampling, together: int) -> 
         reference = reference[together - 1 : count : together][whole]
         sent = moving_mean(*sent, sampling.between, together * step)
     if time.size < FEWEST:
-        raise RecordingError(f"{time.size} rows without gaps are fewer than {FEWEST}")
+        raise RecordingError(
+            f"{time.size} rows without gaps are fewer than the {FEWEST} that are needed"
+        )
     return Recording(time, reference, output, units=part.units, source=part.source, sent=sent)
 
 

@@ -17,7 +17,7 @@ def in_full(one: LoopLatency, stages: Sequence[Stage] = ()) -> list[str]:
     """All that is known of a loop that has a time, a line each."""
     lines = [one.headline(), *(f"  {words}" for words in said_of(one))]
     for name, measured, fitted in plain_rows(one):
-        beside = f"; from the fit {fitted}" if fitted else ""
+        beside = f"; for the fit {fitted}" if fitted else ""
         lines.append(f"  {name}: {measured}{beside}")
     if one.command == "actuator":
         lines += [f"  {stage.line()}" for stage in stages if stage.part]
@@ -74,13 +74,13 @@ def cost_in_words(one: LoopLatency) -> str:
     half = 0.25 * (cost.largest_ci[1] - cost.largest_ci[0])
     damped = 0.25 * (cost.well_damped_ci[1] - cost.well_damped_ci[0])
     text = (
-        f"a proportional gain is stable up to {claimed(one.verdict, cost.largest, half)} and well "
-        f"damped (Ms 1.7) up to {claimed(one.verdict, cost.well_damped, damped)}"
+        f"a proportional gain is stable up to {claimed(one.verdict, cost.largest, half)}, and "
+        f"well damped (Ms 1.7) up to {claimed(one.verdict, cost.well_damped, damped)}"
     )
     if cost.flown is not None:
         text += f"; {cost.flown:.3g} is flown"
         if cost.delay_margin is None or math.isnan(cost.delay_margin):
-            text += ", which this model says is not stable"
+            text += ", which is not stable with this model"
         elif math.isfinite(cost.delay_margin):
-            text += f", which leaves a delay margin of {stated(cost.delay_margin, 0.0, 's')}"
+            text += f", with a delay margin of {stated(cost.delay_margin, 0.0, 's')}"
     return text

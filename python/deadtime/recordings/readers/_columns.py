@@ -44,11 +44,15 @@ def column_index(label: object, names: Sequence[str], signal: str, name: str) ->
     if count == 1:
         return names.index(name)
     if count > 1:
-        raise RecordingError(f"{label} has {count} columns named {name!r}: rename all but one")
+        raise RecordingError(
+            f"{label} has {count} columns with the name {name!r}: give each column another name"
+        )
     similar = difflib.get_close_matches(name, names, n=1)
     hint = f"; did you mean {similar[0]!r}?" if similar else ""
     shown = ", ".join(repr(one) for one in names[:12]) + (", …" if len(names) > 12 else "")
-    raise RecordingError(f"{label} has no column {name!r} for the {signal}: it has {shown}{hint}")
+    raise RecordingError(
+        f"{label} has no column {name!r} for the {signal}. Its columns are {shown}{hint}"
+    )
 
 
 def read_table(table: Table, names: Mapping[str, str], ends: Range) -> Signals:
@@ -64,7 +68,7 @@ def read_table(table: Table, names: Mapping[str, str], ends: Range) -> Signals:
     }
     lengths = {names[signal]: column.size for signal, column in columns.items()}
     if len(set(lengths.values())) > 1:
-        raise RecordingError(f"{table.label}: the columns differ in length: {lengths}")
+        raise RecordingError(f"the columns of {table.label} have different lengths: {lengths}")
     rows, columns["time"] = _rows(table.label, names["time"], columns["time"], ends)
     columns = {signal: column[rows] for signal, column in columns.items()}
     for signal, column in columns.items():
@@ -72,7 +76,7 @@ def read_table(table: Table, names: Mapping[str, str], ends: Range) -> Signals:
         if bad.size:
             raise RecordingError(
                 f"{table.label}, row {rows.start + bad[0]}: {names[signal]!r} is "
-                f"{column[bad[0]]}; leave the row out, or read a window without it"
+                f"{column[bad[0]]}. Leave this row out, or choose a window without this row"
             )
     return columns
 
@@ -86,7 +90,7 @@ def _rows(
     bad = np.flatnonzero(~np.isfinite(stamps))
     if bad.size:
         raise RecordingError(
-            f"{label}, row {known[bad[0]]}: {name!r} is {stamps[bad[0]]}; leave the row out"
+            f"{label}, row {known[bad[0]]}: {name!r} is {stamps[bad[0]]}. Leave this row out"
         )
     for wrong in (np.diff(stamps) < 0.0, np.diff(stamps) == 0.0):
         place = int(np.argmax(wrong)) if wrong.any() else None
@@ -119,12 +123,12 @@ def numbers(label: str, values: Any) -> NDArray[np.float64]:
             array = array / np.timedelta64(1, "s")
         if array.dtype.kind not in "biufO" or any(isinstance(one, str) for one in _some(array)):
             kind = "complex numbers" if array.dtype.kind == "c" else f"{array.dtype} values"
-            raise TypeError(f"it holds {'text' if array.dtype.kind in 'OUST' else kind}")
+            raise TypeError(f"it contains {'text' if array.dtype.kind in 'OUST' else kind}")
         column = array.astype(np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise RecordingError(f"{label} is not a column of numbers: {error}") from None
     if column.ndim != 1:
-        raise RecordingError(f"{label} has shape {column.shape}: give a column (n,)")
+        raise RecordingError(f"{label} has shape {column.shape}: give a one-dimensional array")
     return column
 
 

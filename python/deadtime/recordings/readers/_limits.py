@@ -23,8 +23,8 @@ def check_numbers(path: object, size: int, count: int) -> None:
     """Refuse a file that says it holds more numbers than its size allows."""
     if 8 * count > largest(size):
         raise RecordingError(
-            f"{path} has {size} bytes but claims to hold {count} numbers: it is damaged, or "
-            "compressed more than a hundredfold"
+            f"{path} has only {size} bytes, but should contain {count} numbers. The file is "
+            "damaged, or compressed more than a hundredfold"
         )
 
 
@@ -36,8 +36,8 @@ def errors_of(path: object, what: str) -> Iterator[None]:
     except DeadtimeError:
         raise
     except Exception as error:
-        told = " ".join(str(error).split())[:200] or "no reason is told"
+        told = " ".join(str(error).split())[:200] or "without a reason"
         raise RecordingError(
-            f"{path} cannot be read as {what}, it may be damaged or cut off: "
+            f"{path} cannot be read as {what}, so it may be damaged or cut off: "
             f"{type(error).__name__}: {told}"
         ) from error

@@ -64,7 +64,7 @@ def _unpacked(data: memoryview, limit: int) -> memoryview:
     unpacking = zlib.decompressobj()
     content = unpacking.decompress(data, limit)
     if not unpacking.eof:
-        raise ValueError(f"a variable is cut off, or unpacks to more than {limit} bytes")
+        raise ValueError(f"a variable is cut off, or has more than {limit} bytes when unpacked")
     return memoryview(content)
 
 
@@ -93,14 +93,16 @@ class _Reader:
                 start = at + 8
                 after = start + size + (0 if kind == PACKED else -size % 8)
             if start + size > min(after, len(data)):
-                raise ValueError(f"an element of {size} bytes ends after its variable or the file")
+                raise ValueError(
+                    f"an element of {size} bytes ends outside of its variable or the file"
+                )
             yield kind, data[start : start + size]
             at = after
 
     def numbers(self, element: Element) -> NDArray[Any]:
         kind, data = element
         if kind not in NUMBERS:
-            raise ValueError(f"numbers have the type {kind}, which there is not")
+            raise ValueError(f"numbers have the unknown type {kind}")
         return np.frombuffer(data, f"{self.order}{NUMBERS[kind]}")
 
     def columns(
@@ -146,5 +148,5 @@ class _Reader:
             for name in names:
                 kind, data = _next(parts)
                 if kind != ARRAY:
-                    raise ValueError(f"a field has the type {kind}")
+                    raise ValueError(f"a field has the unknown type {kind}")
                 yield from self.columns(data, f"{element}.{name}", depth + 1)

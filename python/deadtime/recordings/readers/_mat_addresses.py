@@ -42,9 +42,15 @@ def signals(array: NDArray[Any]) -> Iterator[NDArray[Any]]:
 def check_columns(what: object, count: int) -> None:
     """Refuse too many columns."""
     if count > COLUMNS:
-        raise RecordingError(f"{what} has more than {COLUMNS} columns: save the ones you need")
+        raise RecordingError(
+            f"{what} has more than {COLUMNS} columns: save only the columns that are needed"
+        )
 
 
 def with_objects(path: object, has_objects: bool) -> str:
     """What messages call a file, with a remark if it has objects."""
-    return f"{path} (timeseries and other objects in it are left out)" if has_objects else str(path)
+    return (
+        (f"{path} (a timeseries and other objects in it cannot be read)")
+        if has_objects
+        else str(path)
+    )

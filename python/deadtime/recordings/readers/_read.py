@@ -127,7 +127,7 @@ def read_recording(
         label, own = LABEL, ""
         if delimiter is not None:
             raise ValueError(
-                f"delimiter={delimiter!r}: a table in memory has no delimiter; leave delimiter out"
+                f"delimiter={delimiter!r}: a table in memory has no delimiter. Leave delimiter out"
             )
         table = table_in_memory(source)
         columns = _in_seconds(read_table, table, choose(LABEL, table.names), ends)
@@ -147,7 +147,7 @@ def read_recording(
         called = "reference" if reference is None else f"reference {reference!r}"
         raise RecordingError(
             f"{label}: the {called} is {recording.reference[0]:g} throughout, so there is no "
-            "step; choose another column or window, or name the column of the command"
+            "step. Choose another column or window, or name the column of the command"
         )
     return recording
 
@@ -175,7 +175,7 @@ def _refuse_other_units(label: str, time: NDArray[np.float64]) -> None:
     if first > LATEST:
         raise RecordingError(
             f"{label}: the time begins at {first:.6g}, which cannot be seconds since 1970. "
-            "Divide milliseconds by 1000, microseconds by a million"
+            "Divide milliseconds by 1000, or microseconds by a million"
         )
 
 
@@ -192,8 +192,8 @@ def _from_file(
             return _in_seconds(read_csv, text, choose(path, text.header), ends)
     if delimiter is not None:
         raise ValueError(
-            f"delimiter={delimiter!r}: {path} is a file of {kind}, which has no delimiter; "
-            "leave delimiter out"
+            f"delimiter={delimiter!r}: {path} is a file of {kind}, which has no delimiter. "
+            "Leave delimiter out"
         )
     table = _table(path, kind, named)
     names = choose(path, table.names)

@@ -36,6 +36,6 @@ def time_error(where: str, before: float, now: float) -> RecordingError:
     """What is wrong with a time that does not increase."""
     what = "repeats" if now == before else "goes back"
     return RecordingError(
-        f"{where}: the time {what} ({before!r} is followed by {now!r}); sort the rows and keep "
-        "one of each time stamp"
+        f"{where}: the time {what} ({before!r} is followed by {now!r}). Sort the rows, and keep "
+        "one row of each time stamp"
     )

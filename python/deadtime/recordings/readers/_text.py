@@ -73,7 +73,7 @@ def as_text(path: object, raw: bytes, wanted: Collection[str], delimiter: str | 
     """Find the header of a file, and the separator under which it holds the `wanted` names."""
     if delimiter is not None and (len(delimiter) != 1 or delimiter in '"\r\n'):
         raise RecordingError(
-            f"the delimiter {delimiter!r} is not one character, or it is a quote or a line end"
+            f"delimiter={delimiter!r}: give one character, but not a quote or a line end"
         )
     text, encoding = _decodable(path, raw)
     comments = []
@@ -106,7 +106,7 @@ def _decodable(path: object, raw: bytes) -> tuple[bytes, str]:
         raw = _unpacked(path, raw)
         if format_of(path, raw[:HEAD], "read_recording") not in (None, "text"):
             raise RecordingError(
-                f"{path} is compressed by gzip but contains no text: unpack the file"
+                f"{path} is compressed by gzip, but does not contain text: unpack the file"
             )
     encoding = "utf-8"
     if raw.startswith(UTF_16):
@@ -136,8 +136,8 @@ def _unpacked(path: object, raw: bytes) -> bytes:
         raise RecordingError(f"{path} is damaged and cannot be unpacked: {error}") from None
     if len(text) > limit:
         raise RecordingError(
-            f"{path} has {len(raw)} bytes, but would have more than {limit} when unpacked: if "
-            "this is right, unpack the file yourself"
+            f"{path} has {len(raw)} bytes, but more than {limit} bytes when unpacked. If this "
+            "is right, unpack the file yourself"
         )
     return text
 
@@ -160,8 +160,8 @@ def header_of(
     best = max(headers, key=lambda one: (len({*wanted} & {*headers[one]}), len(headers[one]) > 1))
     if {*wanted}.isdisjoint(headers[best]) and any(map(_are_values, headers.values())):
         raise RecordingError(
-            f"{path}: the first line holds numbers, {line.strip()[:SHOWN]!r}: add a line with the "
-            "names of the columns above it, such as time,reference,output,command"
+            f"the first line of {path} contains numbers, {line.strip()[:SHOWN]!r}. Add a line "
+            "with the names of the columns above, such as time,reference,output,command"
         )
     return headers[best], best
 

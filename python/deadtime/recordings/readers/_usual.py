@@ -45,10 +45,10 @@ def chosen_columns(
         elif signal not in optional:
             shown = ", ".join(map(repr, names[:12])) + (", …" if len(names) > 12 else "")
             raise RecordingError(
-                f"{label} has no column with a usual name for the {signal}"
-                f"{' in s' * (signal == 'time')}, such as "
-                f"{USUAL[signal][0]!r} or {USUAL[signal][1]!r}: it has {shown}; name the column by "
-                f"{signal}=, on the command line --{signal}"
+                f"{label} has no column with a usual name for the "
+                f"{signal}{' in s' * (signal == 'time')}, such as {USUAL[signal][0]!r} or "
+                f"{USUAL[signal][1]!r}. Its columns are {shown}. Name the column by {signal}=, "
+                f"or by --{signal} on the command line"
             )
     return {
         signal: found[signal] for signal in dict.fromkeys([*given, "command"]) if signal in found

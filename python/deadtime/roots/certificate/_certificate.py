@@ -117,7 +117,7 @@ class Certificate(Proof, Stored, Pictured):
         >>> dataclasses.replace(proof, count=0).verify()
         Traceback (most recent call last):
             ...
-        deadtime._base.errors.CertificateError: the certificate is false: 2 roots are proved, not 0
+        deadtime._base.errors.CertificateError: the certificate is false: it proves 2 roots, but ...
         """
         return check(self)
 

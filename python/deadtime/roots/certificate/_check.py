@@ -66,7 +66,7 @@ class _Checker:
         claimed = self.certificate
         (a, b), (c, d) = claimed.region
         if not (a < b and c < d and a < math.inf and b > -math.inf):
-            fail(f"the region {claimed.region} has a range that does not increase")
+            fail(f"its region {claimed.region} has a range that does not increase")
         total = self._zeros()
         re, im = self._check_closing()
         expected = []
@@ -80,19 +80,25 @@ class _Checker:
                 expected.append((re, im, False))
         given = [(contour.re, contour.im, contour.symmetric) for contour in claimed.contours]
         if given != expected:
-            fail(f"the paths go around {given}, not around {expected}")
+            fail(f"its paths go around {given}, but they must go around {expected}")
         for contour in claimed.contours:
             number = self._turns(contour)
             if number != contour.count:
-                fail(f"the function turns {number} times, not {contour.count}")
+                fail(
+                    f"along a path the function turns {number} times, but the certificate states "
+                    f"{contour.count}"
+                )
             if contour.symmetric and im[0] == 0:
                 real = self._real_roots(contour.re)
                 if number < real or (number - real) % 2:
-                    fail(f"{real} of {number} roots are real: the others would not be pairs")
+                    fail(
+                        f"{real} of {number} roots are real, so the other roots cannot be "
+                        "complex pairs"
+                    )
                 number = real + (number - real) // 2
             total += number
         if total != claimed.count:
-            fail(f"{total} roots are proved, not {claimed.count}")
+            fail(f"it proves {total} roots, but it states {claimed.count}")
         return total
 
     def _zeros(self) -> int:
@@ -100,11 +106,11 @@ class _Checker:
         zeros = self.certificate.zeros
         (a, b), (c, d) = self.certificate.region
         if zeros < 0:
-            fail(f"{zeros} roots at 0")
+            fail(f"it states {zeros} roots at 0")
         if zeros == 0 or a > 0 or b < 0 or c > 0 or d < 0:
             return 0
         if a == 0 or b == 0:
-            fail("a root at 0 lies on the edge")
+            fail("the function has a root at 0, on the edge of the region")
         return zeros
 
     # 1: open sides of the region
@@ -117,11 +123,14 @@ class _Checker:
             c, d = -d, -c
         re, im = claimed.closed
         if not all(map(math.isfinite, (*re, *im))):
-            fail("the closed region is not finite")
+            fail("its closed region is not finite")
         radius = math.inf
         if math.isinf(c) or math.isinf(d):
             if claimed.beyond is None:
-                fail("no bound is given for an open imaginary part")
+                fail(
+                    "the region is open in the imaginary part, but the certificate gives no "
+                    "bound for roots far away"
+                )
             row, radius = claimed.beyond
             self._check_dominance(row, radius, (a, b))
         height = max(abs(im[0]), abs(im[1]))
@@ -132,7 +141,10 @@ class _Checker:
         lower = im[0] == c or c < im[0] <= -radius
         upper = im[1] == d or d > im[1] >= radius
         if not (left and right and lower and upper):
-            fail(f"roots between the region {claimed.region} and {claimed.closed} are possible")
+            fail(
+                f"roots of the region {claimed.region} may lie outside the closed region "
+                f"{claimed.closed}"
+            )
         return re, im
 
     def _check_dominance(self, index: int, radius: float, re: tuple[float, float]) -> None:
@@ -142,9 +154,9 @@ class _Checker:
         """
         degree = max(map(len, self.function.rows)) - 1
         if not (0 <= index < len(self.function.rows) and 0 <= radius < math.inf):
-            fail("the bound of the roots is not valid")
+            fail("its bound for roots far away is not valid")
         if len(self.function.rows[index]) != degree + 1:
-            fail("the row that is said to dominate does not have the highest degree")
+            fail("the row that should dominate far away does not have the highest degree")
         room = abs(self.function.rows_exact[index][degree])
         lower = [Fraction(0)] * degree
         for j, row in enumerate(self.function.rows_exact):
@@ -154,7 +166,10 @@ class _Checker:
             else:
                 edge = re[0] if gap > 0 else re[1]
                 if math.isinf(edge):
-                    fail("no term dominates in a strip open to that side")
+                    fail(
+                        "the region is open to one side, and no term of the function dominates "
+                        "there"
+                    )
                 weight = exponential_above(-gap * Fraction(edge))
             for k, c in enumerate(row):
                 if k < degree:
@@ -166,7 +181,7 @@ class _Checker:
         # With radius 0 the whole strip is excluded, which only a constant allows.
         positive = radius > 0 or degree == 0
         if not positive or room * r**degree <= sum(c * r**k for k, c in enumerate(lower)):
-            fail(f"roots beyond |s| = {radius} are not excluded")
+            fail(f"roots with |s| above {radius} are not excluded")
 
     def _is_right_edge(self, x: float, height: float) -> bool:
         return _dominates_rightward(self.function.rows_exact, self.function.delays_exact, x, height)
@@ -191,34 +206,34 @@ class _Checker:
             while here != end:
                 segment = next(segments, None)
                 if segment is None:
-                    fail(f"the path breaks off at {here}")
+                    fail(f"a path ends at {here}, before its last corner")
                 if segment.start != here:
-                    fail(f"the path has a gap between {here} and {segment.start}")
+                    fail(f"a path has a gap between {here} and {segment.start}")
                 here = segment.end
                 if not _is_on_line(segment.start, here, end):
-                    fail(f"the path strays from its edge at {here}")
+                    fail(f"a path leaves the edge of its rectangle at {here}")
         if next(segments, None) is not None:
-            fail("the path goes on behind its end")
+            fail("a path continues after its last corner")
 
     # 3: segments
 
     def _check_segment(self, segment: Segment) -> None:
         """Verify that g stays in the disc of radius error + slope r about `value`, and 0 is not."""
         if not 0 <= segment.reference < len(self.function.rows):
-            fail(f"there is no delay number {segment.reference}")
+            fail(f"a segment refers to delay number {segment.reference}, which does not exist")
         if not (segment.error >= 0 and segment.slope >= 0):
-            fail("a bound is negative")
+            fail("a segment has a negative bound")
         where = f"between {segment.start} and {segment.end}"
         radius = _radius(segment.start, segment.middle, segment.end)
         value = pair(segment.value)
         spread = Fraction(segment.error) + Fraction(segment.slope) * radius
         if not spread**2 < value[0] ** 2 + value[1] ** 2:
-            fail(f"the function may vanish {where}")
+            fail(f"the function may be zero {where}")
         # The enclosure needs more digits if the slope times r is to be compared with the value.
         size = abs(segment.value) / max(1.0, float(radius))
         found = self.function.enclose(segment.middle, segment.reference, size)
         if not found.is_within(value, Fraction(segment.error)):
-            fail(f"the value stated for {segment.middle}, {where}, is not the function's")
+            fail(f"the function at {segment.middle}, {where}, differs from the stated value")
         bend = self.function.bend(segment.middle, radius, segment.reference)
         steepest = found.slope_above() + bend * radius
         claimed = Fraction(segment.slope)
@@ -226,7 +241,7 @@ class _Checker:
             # A sharper bound, for segments close to several roots.
             steepest = self.function.steepness(segment.middle, radius, segment.reference, size)
         if steepest > claimed:
-            fail(f"the slope stated {where} can be exceeded")
+            fail(f"the slope of the function can exceed the stated slope {where}")
 
     # 4: turns
 
@@ -257,17 +272,20 @@ class _Checker:
         number = half_turns + round(total / turn)
         off = abs(total - (number - half_turns) * turn) + abs(number - half_turns) + slack
         if off >= turn // 4:
-            fail("the function does not turn a whole number of times")
+            fail("along a path the function does not turn a whole number of times")
         unit = 1 if contour.symmetric else 2
         if number < 0 or number % unit:
-            fail(f"{number} half turns are no number of roots")
+            fail(
+                f"along a path the function turns {number} half turns, which is not a possible "
+                "number of roots"
+            )
         return number // unit
 
     def _clear_end(self, place: complex, segment: Segment) -> tuple[Fraction, Fraction]:
         """Enclose g where a leg begins or ends, with a relative error of 2^-20."""
         found = self.function.enclose(place, segment.reference, abs(segment.value))
         if found.lost << 20 > max(abs(found.vr), abs(found.vi)):
-            fail(f"the function may vanish at {place}")
+            fail(f"the function may be zero at {place}")
         unit = Fraction(1, 1 << found.bits)
         return found.vr * unit, found.vi * unit
 
@@ -280,18 +298,18 @@ class _Checker:
         for part in self.certificate.real:
             start, end = part.start.real, part.end.real
             if start != here or not start < end:
-                fail(f"the real axis has a gap between {here} and {start}")
+                fail(f"the segments of the real axis have a gap between {here} and {start}")
             if isinstance(part, Monotone):
                 total += self._check_monotone(part)
             else:
                 if part.start.imag or part.end.imag or part.middle.imag:
-                    fail("a part of the real axis lies off it")
+                    fail("a segment of the real axis does not lie on the real axis")
                 if not start <= part.middle.real <= end:
-                    fail("a middle lies outside its segment")
+                    fail("the middle of a segment lies outside the segment")
                 self._check_segment(part)
             here = end
         if here != re[1]:
-            fail(f"the real axis is not covered beyond {here}")
+            fail(f"the real axis is not covered right of {here}")
         return total
 
     def _check_monotone(self, part: Monotone) -> int:
@@ -299,25 +317,29 @@ class _Checker:
         if not 0 <= part.reference < len(self.function.rows) or not (
             part.error >= 0 and part.bend >= 0
         ):
-            fail("a part of the real axis is badly formed")
+            fail("a segment of the real axis has a number that is not possible")
         start, end, middle = map(Fraction, (part.start, part.end, part.middle))
         radius = max(end - middle, middle - start)
         slope, error, bend = map(Fraction, (part.slope, part.error, part.bend))
         if not error + bend * radius < abs(slope) or not start <= middle <= end:
-            fail(f"the function may turn around between {part.start} and {part.end}")
+            fail(
+                f"between {part.start} and {part.end} the slope of the function may change its sign"
+            )
         found = self.function.enclose(complex(part.middle), part.reference, abs(part.slope))
         unit = Fraction(1, 1 << found.bits)
         if abs(found.wr * unit - slope) + found.worse * unit > error:
-            fail(f"the slope stated at {part.middle} is not the function's")
+            fail(f"the slope of the function at {part.middle} differs from the stated slope")
         if self.function.bend(complex(part.middle), radius, part.reference) > bend:
-            fail(f"the curvature stated about {part.middle} can be exceeded")
+            fail(
+                f"the curvature of the function near {part.middle} can exceed the stated curvature"
+            )
         signs = set()
         for end_point in (part.start, part.end):
             found = self.function.enclose(
                 complex(end_point), part.reference, abs(part.slope) * 1e-9
             )
             if abs(found.vr) <= found.lost:
-                fail(f"the function may vanish at {end_point}")
+                fail(f"the function may be zero at {end_point}")
             signs.add(found.vr > 0)
         return len(signs) - 1
 
@@ -366,7 +388,7 @@ def _radius(start: complex, middle: complex, end: complex) -> Fraction:
     elif start.real == middle.real == end.real:
         a, m, b = start.imag, middle.imag, end.imag
     else:
-        fail(f"a middle lies off its segment, between {start} and {end}")
+        fail(f"the middle of the segment from {start} to {end} does not lie on the segment")
     return max(abs(Fraction(m) - Fraction(a)), abs(Fraction(b) - Fraction(m)))
 
 

@@ -39,7 +39,7 @@ def scaled(x: Fraction, q: int) -> int:
     """A multiple of 2**-q, times 2**q."""
     n, remainder = divmod(x.numerator << q, x.denominator)
     if remainder:
-        raise ValueError(f"{x} is no multiple of 2**-{q}")
+        raise ValueError(f"{x} is not a multiple of 2**-{q}")
     return n
 
 
@@ -84,7 +84,7 @@ def exponential(n: int, q: int, bits: int) -> tuple[int, int, int]:
     """
     if abs(n) >> q >= 1 << _LARGEST_EXPONENT:
         if n > 0:
-            raise OverflowError("an exponential too large for any certificate")
+            raise OverflowError("an exponential is larger than in any certificate")
         return 0, 1, 1 << _LARGEST_EXPONENT
     work = bits + _GUARD
     t = shifted(n, work - q)
@@ -112,7 +112,7 @@ def exponential_between(x: Fraction, bits: int) -> tuple[Fraction, Fraction]:
 def cos_sin(n: int, q: int, bits: int) -> tuple[int, int]:
     """Cosine and sine of n / 2**q times 2**bits, each within 2."""
     if abs(n) >> q >= 1 << _LARGEST_ANGLE:
-        raise OverflowError("an angle too large for any certificate")
+        raise OverflowError("an angle is larger than in any certificate")
     work = bits + _GUARD
     t = shifted(n, work - q)
     half_pi = pi(work + 64)

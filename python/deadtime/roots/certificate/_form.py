@@ -30,12 +30,14 @@ def check_form(certificate: Proof) -> None:
     """
     check_types(certificate)
     if certificate.count < 0 or certificate.zeros < 0:
-        raise ValueError("a number of roots is negative: count and zeros are 0 or more")
+        raise ValueError("a number of roots is negative, but count and zeros must be 0 or more")
     if abs(certificate.scale) > _LARGEST_SCALE:
         raise ValueError(
-            f"scale={reprlib.repr(certificate.scale)}: coefficients are doubles, which 2^scale "
-            f"brings to about 1 for a scale between {-_LARGEST_SCALE} and {_LARGEST_SCALE}"
+            f"scale={reprlib.repr(certificate.scale)}: the coefficients times 2^scale should be "
+            f"about 1, which needs a scale between {-_LARGEST_SCALE} and {_LARGEST_SCALE}"
         )
     contours = len(certificate.contours)
     if contours > _MOST_CONTOURS:
-        raise ValueError(f"{contours} contours: a region has at most {_MOST_CONTOURS}")
+        raise ValueError(
+            f"there are {contours} contours, but a region has at most {_MOST_CONTOURS}"
+        )

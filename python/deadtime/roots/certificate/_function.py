@@ -63,7 +63,7 @@ class ExactFunction:
     ) -> None:
         rows = [_trimmed(row, zeros) for row in coefficients]
         if len(rows) != len(delays) or not rows:
-            fail("coefficients and delays do not belong together")
+            fail("the numbers of coefficient rows and of delays differ")
         factor = Fraction(2) ** scale
         exact = [[Fraction(c) * factor for c in row] for row in rows]
         self.rows_exact = exact
@@ -72,7 +72,7 @@ class ExactFunction:
         if any(not a < b for a, b in pairwise(self.delays_exact)) or any(
             tau < 0 for tau in self.delays_exact
         ):
-            fail("the delays do not increase from 0 up")
+            fail("its delays are negative or do not increase")
         (self.delays,), self.t = whole([self.delays_exact])
 
     def enclose(self, s: complex, index: int, size: float) -> Enclosure:
@@ -99,7 +99,7 @@ class ExactFunction:
         widest = max(map(abs, gaps)).bit_length() - self.t
         bits = _DIGITS - math.frexp(size)[1] + max(0, largest) + max(0, widest)
         if bits > _MOST_DIGITS:
-            raise OverflowError(f"a value takes {bits} binary digits to check")
+            raise OverflowError(f"checking a value takes {bits} binary digits, which is too many")
         bits = max(128, -(-bits // 64) * 64)
         found = Enclosure(bits)
         for (pr, pi_, dr, di, shift), gap in zip(polynomials, gaps, strict=True):
@@ -261,12 +261,12 @@ def fail(message: str) -> NoReturn:
 def _trimmed(row: Sequence[float], zeros: int) -> list[float]:
     """A row divided by s^zeros, without trailing zeros."""
     if any(row[:zeros]):
-        fail(f"s^{zeros} is not a factor of the function")
+        fail(f"the function cannot be divided by s^{zeros}")
     kept = list(row[zeros:])
     while kept and kept[-1] == 0:
         kept.pop()
     if not kept:
-        fail("a row of coefficients is zero")
+        fail("a row of coefficients contains only zeros")
     return kept
 
 
@@ -281,7 +281,9 @@ def affordable(
     digits = sum(point.numerator.bit_length() + point.denominator.bit_length() for point in points)
     work = digits * max(map(len, rows)) * sum(map(len, rows))
     if work > limit:
-        raise OverflowError(f"polynomials take {work} binary digits to check")
+        raise OverflowError(
+            f"checking the polynomials takes {work} binary digits, which is too many"
+        )
 
 
 def _ceil(x: Fraction, bits: int) -> int:

@@ -81,7 +81,7 @@ class Stored:
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise ValueError(f"{wrong}: {error}") from error
         except RecursionError:
-            raise ValueError(f"{wrong}: brackets are nested deeper than in one") from None
+            raise ValueError(f"{wrong}: its brackets are nested too deeply") from None
         return read
 
 
@@ -92,7 +92,7 @@ def refusing(noun: str) -> Iterator[None]:
         yield
     except (OverflowError, ZeroDivisionError, ValueError, IndexError, TypeError) as error:
         raise CertificateError(
-            f"the {noun} has a number out of range, or a part of no use: {error}"
+            f"the {noun} contains a number or a part that is not possible: {error}"
         ) from error
 
 
@@ -139,7 +139,7 @@ def _types_of_parts(kind: Any, number: int) -> tuple[Any, ...]:
     kinds = get_args(kind)
     kinds = (kinds[0],) * number if kinds[-1] is Ellipsis else kinds
     if len(kinds) != number:
-        raise ValueError(f"{number} parts, not {len(kinds)}")
+        raise ValueError(f"{number} parts instead of {len(kinds)}")
     return kinds
 
 
@@ -167,18 +167,18 @@ def _read_fields(kinds: tuple[Any, ...], data: Any) -> Any:
         if hints.keys() == data.keys():
             return kind(**{name: _read(hint, data[name]) for name, hint in hints.items()})
     differing = sorted(_hints(kinds[0]).keys() ^ data.keys())
-    raise KeyError(f"missing or unknown: {reprlib.repr(differing)}")
+    raise KeyError(f"these fields are missing or unknown: {reprlib.repr(differing)}")
 
 
 def _list(data: Any) -> list[Any]:
     if not isinstance(data, list):
-        raise TypeError(f"{reprlib.repr(data)} is not a list")
+        raise TypeError(f"there is {reprlib.repr(data)} instead of a list")
     return data
 
 
 def _number(text: Any) -> float:
     if not isinstance(text, str):
-        raise TypeError(f"{reprlib.repr(text)}: a number is written in hexadecimal")
+        raise TypeError(f"there is {reprlib.repr(text)} instead of a number in hexadecimal")
     return float.fromhex(text)
 
 
@@ -191,7 +191,7 @@ def _check(name: str, value: Any, hint: Any) -> None:
     if dataclasses.is_dataclass(kind):
         if not isinstance(value, options):
             expected = " or ".join(option.__name__ for option in options)
-            raise ValueError(f"{name} is {reprlib.repr(value)}, not a {expected}")
+            raise ValueError(f"{name} is {reprlib.repr(value)}, but it must be a {expected}")
         used: Any = type(value)
         for field, part in _hints(used).items():
             _check(f"{name}.{field}", getattr(value, field), part)
@@ -205,13 +205,15 @@ def _check(name: str, value: Any, hint: Any) -> None:
             _check(f"{name}[{number}]", part, of)
     elif get_origin(kind) is Literal:
         if not isinstance(value, str) or value not in get_args(kind):
-            raise ValueError(f"{name} is {reprlib.repr(value)}, not one of {get_args(kind)}")
+            raise ValueError(
+                f"{name} is {reprlib.repr(value)}, but it must be one of {get_args(kind)}"
+            )
     else:
         _is(name, value, kind)
 
 
 def _is(name: str, value: Any, kind: type) -> None:
     if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-        raise ValueError(f"{name} is {reprlib.repr(value)}, not {_WORDS[kind]}")
+        raise ValueError(f"{name} is {reprlib.repr(value)}, but it must be {_WORDS[kind]}")
     if kind in (float, complex) and value != value:
-        raise ValueError(f"{name} is {value}, not {_WORDS[kind]}")
+        raise ValueError(f"{name} is {value}, but it must be {_WORDS[kind]}")

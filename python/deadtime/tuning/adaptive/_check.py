@@ -56,7 +56,7 @@ def check_form(claims: Claims) -> None:
     numbers += [] if claims.limit is None else [claims.limit]
     numbers += [] if claims.filter is None else claims.filter[:2]
     if not all(map(math.isfinite, numbers)):
-        raise ValueError("not all numbers are finite")
+        raise ValueError("it contains a number that is not finite")
 
 
 def _check_numbers(claims: Claims) -> None:
@@ -64,27 +64,33 @@ def _check_numbers(claims: Claims) -> None:
     low, high = claims.gain
     if not (low <= high and low * high > 0.0):
         _fail(
-            f"the gain of the plant is from {low:g} to {high:g}, but this range must ascend and "
-            "must not contain zero"
+            f"its gain of the plant is from {low:g} to {high:g}, but this range must increase "
+            "and must not contain zero"
         )
     if not (claims.sample_time > 0.0 and claims.Kp != 0.0):
         _fail(
-            f"the sample time is {claims.sample_time:g} s and Kp {claims.Kp:g}: the sample time "
-            "must be above zero, and Kp must not be zero"
+            f"its sample time is {claims.sample_time:g} s and its Kp {claims.Kp:g}, but the "
+            "sample time must be above zero, and Kp must not be zero"
         )
     if not claims.factors or len(claims.factors) != len(claims.ages):
-        _fail(f"{len(claims.factors)} factors have {len(claims.ages)} ranges of ages")
+        _fail(f"it has {len(claims.factors)} factors, but {len(claims.ages)} ranges of ages")
     if not 0.0 < claims.least_factor <= min(claims.factors):
-        _fail(f"the least factor is {claims.least_factor:g}, the factors are {claims.factors}")
+        _fail(
+            f"its least factor is {claims.least_factor:g}, which is not possible with the "
+            f"factors {claims.factors}"
+        )
     if claims.limit is None and claims.least_factor != min(claims.factors):
-        _fail("without a limit the least factor is that of a set")
+        _fail("without a limit, its least factor must be one of the factors")
     if claims.limit is not None and claims.limit <= 0.0:
-        _fail(f"the limit is {claims.limit:g}")
+        _fail(f"its limit is {claims.limit:g}, but a limit must be above zero")
     for first, last in claims.ages:
         if not 0 <= first <= last:
-            _fail(f"ages run from {first} to {last}")
+            _fail(f"its ages run from {first} to {last}, which is not possible")
     if claims.decay < 0.0 or claims.step < 0.0:
-        _fail(f"the decay is {claims.decay:g}/s and the step {claims.step:g}")
+        _fail(
+            f"its decay is {claims.decay:g}/s and its step {claims.step:g}, but neither may be "
+            "negative"
+        )
 
 
 @dataclass(frozen=True)
@@ -108,19 +114,19 @@ class _Checker:
         self.now = len(self.plant.output) + (2 if self.smooth else 0)
         self.size = self.now + max(last for _, last in claims.ages)
         if len(claims.form) != self.size or any(len(row) != self.size for row in claims.form):
-            _fail(f"the form is not one of {self.size} states")
+            _fail(f"its form does not have {self.size} states")
         if self.size > MOST_STATES:
-            raise OverflowError(f"{self.size} states take too long to check")
+            raise OverflowError(f"its form has {self.size} states, too many to check")
         self.form = [[Fraction(entry) for entry in row] for row in claims.form]
         self.whole, _ = whole(self.form)
         if any(self.form[i][j] != self.form[j][i] for i in range(self.size) for j in range(i)):
-            _fail("the form is not symmetric")
+            _fail("its form is not symmetric")
         self.signal = self._signal()
 
     def step(self) -> float:
         """Verify all claims."""
         if not _is_positive(self.whole):
-            _fail("the form is not positive definite")
+            _fail("its form is not positive definite")
         claims = self.claims
         kept = exponential_of(Enclosed(-2.0 * claims.decay) * Enclosed(claims.sample_time)).low
         everyday = min(claims.factors)
@@ -142,7 +148,7 @@ class _Checker:
         sign = 1 if high > 0.0 else -1
         chains = list(combinations_with_replacement(sorted(ends), len(self.plant.shares)))
         if len(chains) * 2 ** len(self.plant.shares) > MOST_MATRICES:
-            raise OverflowError(f"{len(chains)} orders of commands take too long to check")
+            raise OverflowError(f"it has {len(chains)} orders of commands, too many to check")
         for chain in chains:
             # A command has one factor, also where it is obeyed in both parts of a sample.
             ages = sorted(set(chain))
@@ -153,7 +159,7 @@ class _Checker:
                     told = ", ".join(
                         f"{float(gain):.4g} at age {age}" for age, gain in loop.items()
                     )
-                    _fail(f"the form is not proved to decrease with the loop gains {told}")
+                    _fail(f"with the loop gains {told}, its form is not proved to decrease")
 
     def _matrix(self, commands: Sequence[tuple[int, Fraction]]) -> list[Row]:
         """The transition over a sample in which these ages with these gains are obeyed."""
@@ -192,7 +198,9 @@ class _Checker:
             row += [share * one for one in self.smooth.C]
         elif claims.Kv != 0.0:
             if plant.slope is None:
-                _fail("y' is not a state of the plant, and has no filter")
+                _fail(
+                    "the velocity y' is not a state of the plant, and the controller has no filter"
+                )
             row = [one + share * slope for one, slope in zip(row, plant.slope, strict=True)]
         return row + [Enclosed(0)] * (self.size - len(row))
 
@@ -239,7 +247,7 @@ class _Checker:
             for i in range(self.size):
                 bound[i][i] -= most * most * radius * self.size
             if not _is_positive(whole(bound)[0]):
-                _fail("the form does not bound the command")
+                _fail("its form does not bound the command")
         start = list(self.plant.rest)
         start += [Enclosed(1), Enclosed(0)] if self.smooth is not None else []
         energy = Enclosed(0)
@@ -247,16 +255,16 @@ class _Checker:
             for j, b in enumerate(start):
                 energy = energy + a * b * Enclosed(self.form[i][j])
         if energy.high * Fraction(claims.step) ** 2 > 1:
-            _fail(f"a step of {claims.step:g} leaves the level set of the form")
+            _fail(f"a step of {claims.step:g} can leave the level set of its form")
 
 
 def _plant(claims: Claims) -> _Plant:
     """The plant over a sample, of the loop gain one: see `_claims`."""
     num, den = list(claims.num), list(claims.den)
     if len(den) not in (2, 3) or den[0] == 0.0 or den[-1] != 0.0 or den[-2] == 0.0:
-        _fail(f"the denominator is {den}, not that of an integrator with one lag at most")
+        _fail(f"the denominator is {den}, but the plant must be an integrator with at most one lag")
     if not 1 <= len(num) < len(den) or num[-1] == 0.0:
-        _fail(f"the numerator is {num}")
+        _fail(f"the numerator is {num}, which is not possible")
     one, zero, period = Enclosed(1), Enclosed(0), Enclosed(claims.sample_time)
     if len(den) == 2:
         drive = Enclosed(num[0]) / Enclosed(den[0])
@@ -272,7 +280,7 @@ def _plant(claims: Claims) -> _Plant:
     later = (reached - period * b1) / (ending - b1)
     first = period - later
     if first.low <= 0 or later.low <= 0:
-        _fail("the end tangents of the plant's response do not meet between its ends")
+        _fail("the tangents at the ends of the plant's response meet outside of the response")
     return _Plant(
         transition=[[faded, slow], [zero, one]],
         shares=[[first * b1, first * b0], [later * ending, later * b0]],
@@ -292,7 +300,10 @@ class _Filter:
     def __init__(self, numbers: FilterNumbers, sample_time: float) -> None:
         omega, damping, rule = numbers
         if rule not in ("tustin", "backward") or omega <= 0.0 or damping <= 0.0:
-            raise ValueError(f"a filter of {omega:g} rad/s, {damping:g} by the rule {rule!r}")
+            raise ValueError(
+                f"a filter of {omega:g} rad/s with damping {damping:g} by the rule {rule!r} is "
+                "not possible"
+            )
         weight = Fraction(1, 2) if rule == "tustin" else Fraction(1)
         w = Fraction(omega)
         x = Fraction(sample_time) * w  # Ts w

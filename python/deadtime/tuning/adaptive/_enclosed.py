@@ -36,7 +36,7 @@ class Enclosed:
 
     def __truediv__(self, other: Enclosed) -> Enclosed:
         if other.low <= 0 <= other.high:
-            raise ZeroDivisionError("a divisor that may be zero")
+            raise ZeroDivisionError("the divisor may be zero")
         return self * Enclosed(1 / other.high, 1 / other.low)
 
     @property

@@ -134,7 +134,10 @@ class GainSchedule(ReadOnlyArrays, Pictured):
         -------
         str
         """
-        lines = [f"{len(self.sets)} sets of gains, the fastest that the delay permits is used:"]
+        lines = [
+            f"{len(self.sets)} sets of gains. The schedule uses the fastest set that the delay "
+            "allows:"
+        ]
         for one in self.sets:
             gains = ", ".join(f"{name} = {value:.4g}" for name, value in one.gains.items())
             low, high = one.delays
@@ -142,20 +145,23 @@ class GainSchedule(ReadOnlyArrays, Pictured):
         low, high = self.proof.gain
         over = f"{low:g}" if low == high else f"{low:g} to {high:g}"
         lines.append(
-            "proved with one quadratic form: stable while delay and gains change at any time, for a"
-            f" gain of the plant of {over}"
+            "One quadratic form proves that the loop stays stable while delay and gains change "
+            f"at any time, if the gain of the plant is {over}"
         )
         if self.proof.decay > 0.0:
-            lines.append(f"decays at least as e^(-{self.proof.decay:g} t) away from the limit")
+            lines.append(
+                "away from the limit, the response decays at least as fast as "
+                f"e^(-{self.proof.decay:g} t)"
+            )
         if self.proof.limit is not None:
             lines.append(
-                f"with the limit of {self.proof.limit:g} for steps from rest of up to "
-                f"{self.proof.step:.3g}"
+                f"with the limit of {self.proof.limit:g}, the proof is for steps from rest of "
+                f"up to {self.proof.step:.3g}"
             )
         if self.lowered < 1.0:
             lines.append(
-                f"for gains of the same margins there is no proof: they were moved to the robust "
-                f"ones, to {100.0 * self.lowered:.0f} % of the way from these"
+                "for gains with equal margins no proof was found, so the gains were moved "
+                f"towards the robust gains, to {100.0 * self.lowered:.0f} % of the way"
             )
         return "\n".join(lines)
 
@@ -242,17 +248,17 @@ def adaptive_gains(
     >>> loop = dtm.ControlLoop(dtm.Integrator(0.9), dtm.P(1.0), sample_time=0.1, limit=1.0)
     >>> schedule = adaptive_gains(loop, (0.1, 0.4), sets=3)
     >>> print(schedule.summary())
-    3 sets of gains, the fastest that the delay permits is used:
+    3 sets of gains. The schedule uses the fastest set that the delay allows:
     ...
     """
     count = whole_number("sets", sets, least=1)
     if count > MOST_SETS:
         raise ValueError(
-            f"sets={count}: give at most {MOST_SETS}, since a few sets are nearly as good"
+            f"sets={count}: give at most {MOST_SETS}, because a few sets are nearly as good"
         )
     low, high = interval("delays", delays)
     if low < 0.0:
-        raise ValueError(f"delays={delays!r}: a delay must be zero or more")
+        raise ValueError(f"delays={delays!r}: give delays of zero or more")
     report = stage_report(progress)
     held, plant_gain = loop_and_gain(loop, gain, level)
     period = sample_time_of(held)
@@ -261,9 +267,9 @@ def adaptive_gains(
     states = len(claims.den) - 1 + (2 if claims.filter else 0) + last
     if states > MOST_STATES:
         raise ValueError(
-            f"delays={delays!r} s are up to {last} samples of {period:g} s, so the form would "
-            f"have {states} states, but at most {MOST_STATES} are possible. Take a longer "
-            "sample time or a shorter range"
+            f"delays={delays!r} s are up to {last} samples of {period:g} s, so the proof would "
+            f"need {states} states, but at most {MOST_STATES} are possible. Give a longer "
+            "sample time, or a shorter range of delays"
         )
     if not isinstance(loop, Design):
         report("designing the robust gains")
@@ -329,8 +335,8 @@ def _factors(robust: ControlLoop, first: int, ends: Sequence[int]) -> tuple[floa
     least = np.minimum.accumulate(margins)
     if not (math.isfinite(least[0]) and least[-1] > 1.0):
         raise NotProvedError(
-            f"the robust gains have gain margins of {least[-1]:.3g} to {least[0]:.3g} over the "
-            "range: design them with a gain_margin, or give a shorter range"
+            f"over this range of delays, the robust gains have gain margins of {least[-1]:.3g} "
+            f"to {least[0]:.3g}: design the gains with a gain_margin, or give a shorter range"
         )
     return tuple(float(least[samples <= end][-1] / least[-1]) for end in ends)
 
@@ -344,7 +350,7 @@ def _proved(
     """The claims with a form and the largest factors for which there is one, and their share."""
 
     def attempt(share: float) -> Claims | None:
-        report(f"searching a form, the faster gains at {100.0 * share:.0f} %")
+        report(f"searching a proof with {100.0 * share:.0f} % of the faster gains")
         lowered = tuple(1.0 + share * (factor - 1.0) for factor in factors)
         return _attempt(replace(claims, factors=lowered), step)
 
@@ -354,10 +360,11 @@ def _proved(
     found, share, refused = attempt(0.0), 0.0, 1.0
     if found is None:
         raise NotProvedError(
-            f"no proof was found for the robust gains Kp = {claims.Kp:.4g}, Kv = {claims.Kv:.4g}, "
-            f"with delays that change from {claims.ages[-1][0]} to {claims.ages[-1][1]} samples"
+            f"no proof was found for the robust gains Kp = {claims.Kp:.4g}, Kv = "
+            f"{claims.Kv:.4g}, if the delay varies from {claims.ages[-1][0]} to "
+            f"{claims.ages[-1][1]} samples"
             + ("" if claims.limit is None else f" and steps of {step:g}")
-            + ": take a larger gain_margin, a shorter range, a smaller decay or smaller steps"
+            + ". Give a larger gain_margin, a shorter range, a smaller decay or smaller steps"
         )
     for _ in range(_HALVINGS):
         middle = 0.5 * (share + refused)

@@ -142,7 +142,7 @@ def _solver() -> Any:
         import clarabel  # type: ignore[import, unused-ignore]
     except ImportError as error:
         raise MissingExtraError(
-            "a proof for changing delays is searched with clarabel, which is not installed; this "
-            "line installs it: pip install 'deadtime[adapt]'"
+            "the proof for changing delays needs clarabel, which is not installed. This "
+            "command installs it: pip install 'deadtime[adapt]'"
         ) from error
     return clarabel

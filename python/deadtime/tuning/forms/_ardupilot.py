@@ -30,15 +30,16 @@ WRITTEN = "{name},{value}"
 #: Throttle, 0 to 1, per m/s² of a unit of PSC_ACCZ_P: 100 cm to a metre, and thousandths.
 ACCELERATION = 100.0 * 0.001
 
-BOTH = "The parameters hold for north and east together."
+BOTH = "The parameters apply to north and east together."
 SMALL = (
-    "The firmware uses a square-root law for errors that are large compared with its "
-    "acceleration limit; the gain is that for small errors."
+    "For errors that are large compared with its acceleration limit, the firmware uses a "
+    "square-root law. The gain applies to small errors."
 )
 
 FILTERED = (
-    "The firmware filters the error too, at {name}_FLTE. The design does not include this filter: "
-    "set it to 0, or to at least ten times the crossover frequency."
+    "The firmware also filters the error, with the corner {name}_FLTE. The design does not "
+    "include this filter. Set the corner to 0, or to at least ten times the crossover "
+    "frequency."
 )
 
 #: The first firmware with the names of 4.7.

@@ -67,10 +67,13 @@ LOOPS = ("roll rate", "pitch rate", "yaw rate")
 
 NOTES = (
     "TPA lowers the gains above tpa_breakpoint; iterm_relax holds I while the set point moves.",
-    "The lines switch off the sliders and the dynamic damping, which would change the gains.",
+    "The lines switch off the sliders and the dynamic damping, because both would change "
+    "the gains.",
 )
 
-KEPT_F = "F is left as it is: it takes the derivative of the set point, and is no part of the loop."
+KEPT_F = (
+    "F does not change, because it acts on the derivative of the set point, outside of the loop."
+)
 
 #: How far the gain of F may be from that of D where both make the derivative of the error, in units
 #: of a whole number of both.
@@ -121,9 +124,7 @@ def write(controller: Controller, loop: str, version: tuple[int, ...] | None) ->
     typed = read("\n".join(lines), loop)
     rounding = rounding_of(controller, typed)
     if rounding > COARSE:
-        notes.append(
-            f"The firmware's whole numbers are coarse here: a gain changes by {rounding:.1%}."
-        )
+        notes.append(f"Betaflight has only whole numbers, so a gain changes by {rounding:.1%}.")
     return Settings("betaflight", loop, values, tuple(lines), typed, rounding, tuple(notes), SOURCE)
 
 
@@ -132,7 +133,7 @@ def check(controller: Controller) -> None:
     refuse_feed_forward(controller, "betaflight")
     weight = weights_of(controller)[0]
     if weight != 1.0:
-        raise ValueError(f"weight={weight:g}: Betaflight has no weight of P: take weight=1")
+        raise ValueError(f"weight={weight:g}: Betaflight has no weight of P. Give weight=1")
     smooth = parts_of(controller)[3]
     if smooth is not None:
         _low_pass(smooth)
@@ -146,7 +147,7 @@ def read(given: Mapping[str, float] | str, loop: str) -> Controller:
     else:
         told = _of_head({name: str(value) for name, value in given.items()}, axis)
     if f"p_{axis}" not in told:
-        raise ValueError(f"p_{axis} is missing; the text has {', '.join(told) or 'none'}")
+        raise ValueError(f"p_{axis} is missing. The text contains {', '.join(told) or 'none'}")
     proportional, integral, derivative = (
         _told(told, f"{letter}_{axis}") * scale
         for letter, scale in zip("pid", scales(loop), strict=True)
@@ -182,8 +183,8 @@ def _check_constant(told: Mapping[str, str], axis: str) -> None:
     if 0.0 < least < own or most > own:
         ends = (least, own) if 0.0 < least < own else (own, most)
         raise ValueError(
-            f"d_{axis} moves between {ends[0]:g} and {ends[1]:g} in flight, so that it is no gain: "
-            "set both to one number"
+            f"d_{axis} moves between {ends[0]:g} and {ends[1]:g} in flight, so it is not one "
+            "gain: set both to the same number"
         )
 
 
@@ -191,11 +192,13 @@ def _whole(name: str, gain: float, scale: float, largest: int) -> float:
     """The whole number of a gain, refused where there is none."""
     value = gain / scale
     if not 0.0 <= value <= largest + 0.5:
-        raise ValueError(f"{name} = {value:.1f}: Betaflight takes whole numbers of 0 to {largest}")
+        raise ValueError(
+            f"{name} = {value:.1f}: Betaflight needs a whole number from 0 to {largest}"
+        )
     if gain and value < 0.5:
         raise ValueError(
-            f"{name} = {value:.2g} rounds to zero, which switches it off: Betaflight has whole "
-            "numbers only; design without this gain"
+            f"{name} = {value:.2g} would be rounded to zero, because Betaflight has only whole "
+            "numbers. Design without this gain"
         )
     return float(min(round(value), largest))
 
@@ -210,8 +213,8 @@ def _low_pass(smooth: DerivativeFilter) -> tuple[str, float]:
         if abs(smooth.damping - damping) <= SAME_DAMPING * damping:
             return kind, float(round(hertz / factor))
     raise ValueError(
-        f"{smooth}: Betaflight's filters of D are PT1 (one pole), PT2 (a damping ratio of 1) and "
-        "BIQUAD (0.7071)"
+        f"{smooth}: this filter does not exist in Betaflight. Its filters of D are PT1 (one "
+        "pole), PT2 (a damping ratio of 1) and BIQUAD (0.7071)"
     )
 
 
@@ -222,13 +225,13 @@ def _filter_of(told: Mapping[str, str]) -> DerivativeFilter | None:
         return None
     if len(used) == 2:
         raise ValueError(
-            f"dterm_lpf1_static_hz = {corners[0]:g}, dterm_lpf2_static_hz = {corners[1]:g}: two "
-            "filters of D in a row are more than the controllers here have: set one to 0"
+            f"dterm_lpf1_static_hz = {corners[0]:g}, dterm_lpf2_static_hz = {corners[1]:g}: the "
+            "controllers here have only one filter of D. Set one of the two to 0"
         )
     if _told(told, "dterm_lpf1_dyn_min_hz") > 0.0:
         raise ValueError(
-            "dterm_lpf1_dyn_min_hz is above 0, so that the corner moves with the throttle: set it "
-            "to 0"
+            "dterm_lpf1_dyn_min_hz is above 0, so the corner changes with the throttle. Set "
+            "this parameter to 0"
         )
     name = f"dterm_lpf{used[0]}_type"
     text = told.get(name, "PT1")
@@ -239,7 +242,7 @@ def _filter_of(told: Mapping[str, str]) -> DerivativeFilter | None:
         return DerivativeFilter(2.0 * math.pi * pole_in_row(2, corner), damping=1.0)
     if kind == BIQUAD:
         return DerivativeFilter(2.0 * math.pi * corner, damping=math.sqrt(0.5))
-    raise ValueError(f"{name} = {text}: PT1, PT2 and BIQUAD can be expressed")
+    raise ValueError(f"{name} = {text}: give one of PT1, PT2 and BIQUAD")
 
 
 def _told(told: Mapping[str, str], name: str) -> float:

@@ -59,7 +59,9 @@ class _Times:
         finite("Kc", self.Kc)
         finite("Td", self.Td)
         if math.isnan(self.Ti) or self.Ti == 0.0:
-            raise ValueError(f"Ti={self.Ti}: give an integral time other than zero, inf for none")
+            raise ValueError(
+                f"Ti={self.Ti}: give an integral time other than zero, or inf for no integral"
+            )
 
     def controller(self) -> Controller:
         """The controller with these numbers.
@@ -116,7 +118,8 @@ class IdealForm(_Times):
         proportional, integral, derivative, _ = parts_of(controller)
         if proportional == 0.0:
             raise ValueError(
-                f"{controller}: a proportional gain of zero has no ideal form: take parallel"
+                f"{controller}: without a proportional gain there is no ideal form. Use the "
+                "form parallel"
             )
         times = proportional / integral if integral else math.inf
         return cls(proportional, times, derivative / proportional)
@@ -169,7 +172,7 @@ class SeriesForm(_Times):
         if ideal.Ti * ideal.Td < 0.0 or ideal.Ti < 4.0 * ideal.Td * (1.0 - 1e-12):
             raise ValueError(
                 f"Ti = {ideal.Ti:.4g} s and Td = {ideal.Td:.4g} s: the series form has only "
-                "real zeros, which need Ti >= 4 Td; use ideal or parallel"
+                "real zeros, so it needs Ti >= 4 Td. Use the form ideal or parallel"
             )
         root = math.sqrt(max(1.0 - 4.0 * ideal.Td / ideal.Ti, 0.0))
         # The smaller root by the product of both, which does not cancel.
@@ -250,7 +253,9 @@ def proportional_band(gain: float, spans: tuple[float, float]) -> float:
     """
     measured, given = (finite("a span", one) for one in spans)
     if min(measured, given) <= 0.0 or gain == 0.0:
-        raise ValueError(f"gain={gain:g}, spans={spans}: give spans above zero and a gain not zero")
+        raise ValueError(
+            f"gain={gain:g}, spans={spans}: give spans above zero, and a gain that is not zero"
+        )
     return 100.0 * given / (abs(gain) * measured)
 
 
@@ -275,34 +280,36 @@ def write(controller: Controller, form: str, spans: tuple[float, float] | None) 
     notes = []
     if "b" in values:
         notes.append(
-            "b weights the set point in the proportional term. A controller without it "
-            "overshoots more after a step of the set point, and responds to loads in the same "
-            "way: design with weight=1."
+            "b is the weight of the set point in the proportional term. If your controller has "
+            "no b, a step of the set point overshoots more. To avoid this, design with "
+            "weight=1."
         )
     smooth = parts_of(controller)[3]
     if smooth is not None:
         corner = pole_of(smooth)
         if corner is None:
             raise ValueError(
-                f"{smooth}: the filter of a process controller has one pole, but this one has "
-                "two: use one_pole_filter(corner)"
+                f"{smooth}: in a process controller the filter has one pole, but this filter "
+                "has two. Use one_pole_filter(corner)"
             )
         values[FILTER] = _typed(0.5 / (math.pi * corner))
         lines.append(f"{FILTER} = {values[FILTER]:.{DIGITS}g} s")
     if isinstance(controller, PV):
-        notes.append("The derivative acts on the measurement: switch it off for the set point.")
+        notes.append(
+            "The derivative acts on the measurement: switch off the derivative of the set point."
+        )
     if values.get("Kc", values.get("Kp", 0.0)) < 0.0:
         notes.append(
-            "The gain is negative: the controller is direct acting, and its output rises with the "
-            "measurement."
+            "The gain is negative, so set the controller to direct action: its output rises "
+            "with the measurement."
         )
     typed = read(values, form, isinstance(controller, PV))
     if spans is not None:
         band = proportional_band(parts_of(typed)[0] if form == "parallel" else values["Kc"], spans)
         lines.append(f"PB = {band:.{DIGITS}g} %")
         notes.append(
-            f"The proportional band is that of spans of {spans[0]:g} (measurement) and "
-            f"{spans[1]:g} (output)."
+            f"The proportional band applies to a span of {spans[0]:g} for the measurement and "
+            f"{spans[1]:g} for the output."
         )
     rounding = rounding_of(controller, typed)
     return Settings(form, "", values, tuple(lines), typed, rounding, tuple(notes), SOURCE)
@@ -316,7 +323,8 @@ def read(given: Mapping[str, float] | str, form: str, on_measurement: bool = Fal
     unknown = [name for name in values if name not in (*names, *WEIGHTS.values(), FILTER, "PB")]
     if unknown:
         raise ValueError(
-            f"{unknown[0]!r} is not a parameter of the form {form!r}: {', '.join(names)}"
+            f"{unknown[0]!r} is not a parameter of the form {form!r}. Its parameters are "
+            f"{', '.join(names)}"
         )
     own = {name: value for name, value in values.items() if name in names}
     if next(iter(names)) not in own:
@@ -330,7 +338,10 @@ def read(given: Mapping[str, float] | str, form: str, on_measurement: bool = Fal
     made = controller_from(*parts[:3], smooth if parts[2] else None, on_measurement, **weights)
     for name, short in WEIGHTS.items():
         if short in values and name not in made.parameters:
-            raise ValueError(f"{short} = {values[short]:g}: a {type(made).__name__} has no {short}")
+            raise ValueError(
+                f"{short} = {values[short]:g}: a {type(made).__name__} has no {short}. Leave "
+                "this parameter out"
+            )
     return made
 
 
@@ -347,10 +358,13 @@ def _numbers(text: str, form: str) -> dict[str, float]:
             found[name] = off if value == OFF else float(value)
         except ValueError:
             raise ValueError(
-                f"{name} = {told}: give one number a line, times in seconds, such as {name} = 40.5"
+                f"{name} = {told}: give one number in each line, with times in seconds, such "
+                f"as {name} = 40.5"
             ) from None
         if (unit == "%") != (name == "PB") and unit:
-            raise ValueError(f"{name} = {told}: {name} is not in {unit}")
+            raise ValueError(
+                f"{name} = {told}: give {name} in another unit, because {unit} is not possible"
+            )
     if not found:
         raise ValueError(f"no line of the text belongs to the form {form!r}: {text[:60]!r}")
     return found

@@ -71,7 +71,7 @@ def settings_of(
     if spans is not None:
         raise ValueError(
             f"spans={spans}: only the forms ideal, series and parallel have a proportional "
-            "band; leave spans out"
+            "band. Leave spans out"
         )
     if form == "betaflight":
         return _betaflight.write(controller, loop, _numbers(version))
@@ -150,16 +150,18 @@ LOOPS_OF_FORMS: dict[str, tuple[str, ...]] = {
 
 def _check(form: str, loop: str, version: str) -> None:
     if form not in get_args(Form):
-        raise ValueError(f"form={form!r} is not one of {', '.join(get_args(Form))}")
+        raise ValueError(f"form={form!r}: give one of {', '.join(get_args(Form))}")
     if form in _classical.FORMS:
         for name, value in (("loop", loop), ("version", version)):
             if value:
                 raise ValueError(
-                    f"{name}={value!r}: the form {form!r} is that of no vehicle; leave {name} out"
+                    f"{name}={value!r}: the form {form!r} does not belong to a vehicle. "
+                    f"Leave {name} out"
                 )
     if form in LOOPS_OF_FORMS and loop not in LOOPS_OF_FORMS[form]:
         raise ValueError(
-            f"loop={loop!r}: the loops of {form} are {', '.join(LOOPS_OF_FORMS[form])}"
+            f"loop={loop!r}: give one of the loops of {form}, which are "
+            f"{', '.join(LOOPS_OF_FORMS[form])}"
         )
 
 

@@ -29,13 +29,13 @@ from deadtime.tuning.forms._settings import (
 DIGITS = 4
 
 NO_FILTER = (
-    "The derivative was taken without a filter. The vehicle filters it, so that the loop has less "
-    "phase than was designed: give the controller one_pole_filter(corner)."
+    "The design has no filter of the derivative, but the vehicle has one, so the loop has less "
+    "phase than designed. Give the controller one_pole_filter(corner)."
 )
 
 NO_KICK = (
-    "The firmware takes the derivative of the measurement: load response and margins are those of "
-    "the controller, and a step of the set point has no kick."
+    "The firmware takes the derivative of the measurement. So load response and margins are as "
+    "designed, but the derivative does not respond to a step of the set point."
 )
 
 
@@ -96,8 +96,8 @@ def written(
     for part, gain in gains.items():
         if gain < 0.0:
             raise ValueError(
-                f"{part} gain {gain:g}: the gains of {form} are positive; check the sign of the "
-                "plant, or reverse the actuator in the vehicle's set-up"
+                f"the {part} gain is {gain:g}, but the gains of {form} are positive. Check the "
+                "sign of the plant, or reverse the actuator in the configuration of the vehicle"
             )
     notes = _notes(controller, found)
     values = {found.overall: 1.0} if found.overall else {}
@@ -110,9 +110,9 @@ def written(
         values[found.corner] = _typed(_corner(smooth, form))
     if not found.span[0] <= values[found.proportional] <= found.span[1]:
         notes.append(
-            f"{found.proportional} = {values[found.proportional]:.{DIGITS}g} is outside of "
-            f"{found.span[0]:g} to {found.span[1]:g}, which the firmware's documentation calls "
-            "usual."
+            f"{found.proportional} = {values[found.proportional]:.{DIGITS}g} is outside of the "
+            f"usual range in the firmware's documentation, {found.span[0]:g} to "
+            f"{found.span[1]:g}."
         )
     typed = controller_of(values, found)
     return Settings(
@@ -135,17 +135,18 @@ def check(controller: Controller, found: FirmwareLoop, form: str, loop: str) -> 
     for part, gain in zip(("proportional", "integral", "derivative"), gains, strict=True):
         if gain and part not in found.names:
             raise ValueError(
-                f"{type(controller).__name__}: the {loop} loop of {form} has no {part} gain, only "
-                f"{', '.join(found.names.values())}"
+                f"{type(controller).__name__}: the {loop} loop of {form} has no {part} gain. "
+                f"Its gains are {', '.join(found.names.values())}"
             )
     refuse_feed_forward(controller, form)
     weight, derivative_weight = weights_of(controller)
     if weight != 1.0:
-        raise ValueError(f"weight={weight:g}: {form} has no weight of the set point: take weight=1")
+        raise ValueError(f"weight={weight:g}: {form} has no weight of the set point. Give weight=1")
     if gains[2] and derivative_weight != 1.0 and found.derivative_of == "error":
         raise ValueError(
-            f"{type(controller).__name__}: the {loop} loop of {form} takes the derivative of the "
-            "error, so that a step of the set point kicks: take PD, or PID with derivative_weight=1"
+            f"{type(controller).__name__}: the {loop} loop of {form} takes the derivative of "
+            "the error, which jumps with a step of the set point. Use PD, or PID with "
+            "derivative_weight=1"
         )
     if smooth is not None:
         _corner(smooth, form)
@@ -166,8 +167,8 @@ def _corner(smooth: DerivativeFilter, form: str) -> float:
     corner = pole_of(smooth)
     if corner is None:
         raise ValueError(
-            f"{smooth}: the derivative's filter of {form} has one pole, but this one has two: "
-            "use one_pole_filter(corner)"
+            f"{smooth}: the derivative's filter of {form} has one pole, but this filter has "
+            "two. Use one_pole_filter(corner)"
         )
     return corner
 
@@ -176,7 +177,7 @@ def controller_of(values: Mapping[str, float], found: FirmwareLoop) -> Controlle
     """The controller that the values of these parameters make."""
     if found.proportional not in values:
         names = ", ".join(values) or "none"
-        raise ValueError(f"{found.proportional} is missing; the text has {names}")
+        raise ValueError(f"{found.proportional} is missing. The text contains {names}")
     told = {part: values[name] for part, name in found.names.items() if name in values}
     for part, value in told.items():
         if not math.isfinite(value):

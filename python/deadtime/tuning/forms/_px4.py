@@ -24,8 +24,8 @@ LINE = re.compile(
 
 WRITTEN = "param set {name} {value}"
 
-BOTH = "The parameters hold for north and east together."
-ALL_AXES = "IMU_DGYRO_CUTOFF holds for all axes."
+BOTH = "The parameters apply to north and east together."
+ALL_AXES = "IMU_DGYRO_CUTOFF applies to all axes."
 
 
 def _rate(axis: str, span: tuple[float, float]) -> FirmwareLoop:

@@ -126,7 +126,8 @@ def refuse_feed_forward(controller: Controller, form: str) -> None:
     gain = controller.parameters.get("feed_forward", 0.0)
     if gain:
         raise ValueError(
-            f"feed_forward={gain:g}: {form} is written without feed-forward, so leave it out"
+            f"feed_forward={gain:g}: settings of {form} are written without feed-forward. "
+            "Leave feed_forward out"
         )
 
 
@@ -156,7 +157,7 @@ def one_pole_filter(corner: float) -> DerivativeFilter:
     (590.1, 2.348)
     """
     if not (math.isfinite(corner) and corner > 0.0):
-        raise ValueError(f"corner={corner!r}: give a frequency above zero, Hz")
+        raise ValueError(f"corner={corner!r}: give a frequency in Hz, above zero")
     damping = 0.5 * (1.0 + MADE_FASTER) / math.sqrt(MADE_FASTER)
     return DerivativeFilter(2.0 * damping * 2.0 * math.pi * corner, damping)
 
@@ -185,5 +186,5 @@ def numbers_from(given: Mapping[str, float] | str, form: str, pattern: Any) -> d
         except ValueError:
             continue
     if not found:
-        raise ValueError(f"no line of the text is one of the form {form!r}: {given[:60]!r}")
+        raise ValueError(f"no line of the text belongs to the form {form!r}: {given[:60]!r}")
     return found

@@ -58,10 +58,10 @@ def why_none(fit: PlantEstimate, level: float, allow_indication: bool) -> tuple[
     low, high = fit.ci(level, "gain")
     if not low * high > 0.0:
         ends = f"{low:.3g} and {high:.3g}"
-        return (f"the sign of the plant's gain is not certain: it is between {ends}",)
+        return (f"the sign of the plant's gain is not certain, because its interval is {ends}",)
     if fit.verdict == "reliable" or allow_indication:
         return ()
-    return (f"the estimate is an indication: {fit.reason}",)
+    return (f"the estimate is only an indication: {fit.reason}",)
 
 
 def wanted_gains(
@@ -81,7 +81,7 @@ def wanted_gains(
     chosen, remarks = _one_step(found.loop.controller, flown)
     if fit.verdict != "reliable":
         remarks = (
-            f"Designed although the estimate is only an indication, as you allowed: {fit.reason}.",
+            f"The estimate is only an indication, but you allowed a design on it: {fit.reason}.",
             *remarks,
         )
     return Gains(found, chosen, loops, remarks)
@@ -131,7 +131,7 @@ def _one_step(wanted: Controller, flown: Controller | None) -> tuple[Controller,
         if old := flown.gains.get(name, 0.0):
             if old * gain < 0.0:
                 raise ValueError(
-                    f"{name} = {old:g} was in use, but this plant needs {gain:.3g}, of the "
+                    f"{name} = {old:g} was in use, but this plant needs {gain:.3g}, with the "
                     "other sign: check the signs of command and measurement"
                 )
             low, high = sorted((old / LARGEST_CHANGE, old * LARGEST_CHANGE))
@@ -143,6 +143,6 @@ def _one_step(wanted: Controller, flown: Controller | None) -> tuple[Controller,
         return wanted, ()
     words = ", ".join(f"{name} = {wanted.gains[name]:.4g}" for name in changed)
     return replace(wanted, **gains), (
-        f"The design has {words}. A gain changes by at most a factor of {LARGEST_CHANGE:g} in one "
-        "step: record again with these, and take the next step.",
+        f"The design has {words}. In one step, a gain changes by at most a factor of "
+        f"{LARGEST_CHANGE:g}. Record again with the gains above, and then take the next step.",
     )

@@ -13,8 +13,8 @@ from deadtime.tuning._rules import RuleFigures, RuleTable
 from deadtime.tuning.forms import Settings
 
 CAPTION = (
-    "Predicted under the gains above. The band contains all plants that agree with the "
-    "recording, and on either side twice the standard deviation of the residuals."
+    "Predicted with the gains above. The band contains all plants that agree with the "
+    "recording. On either side it is wider by twice the standard deviation of the residuals."
 )
 
 #: Heads of the table of rules.

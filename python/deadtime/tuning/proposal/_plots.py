@@ -52,7 +52,9 @@ def _draw(upper: Axes, lower: Axes, proposal: Proposal) -> None:
         upper.set_title(f"set point, {own}", fontsize="medium")
     if proposal.load is not None:
         _one(lower, proposal, proposal.load, proposal.shows_load)
-        lower.set_title(f"load of {proposal.load.size:.3g}, beside the command", fontsize="medium")
+        lower.set_title(
+            f"load of {proposal.load.size:.3g}, added to the command", fontsize="medium"
+        )
 
 
 def _one(ax: Axes, proposal: Proposal, told: Prediction, shown: bool) -> None:

@@ -139,7 +139,7 @@ class Proposal(ReadOnlyArrays, Pictured):
         str
         """
         if self.settings is None:
-            return f"none: no gains, because {'; '.join(self.reasons)}"
+            return f"none: no gains were proposed, because {'; '.join(self.reasons)}"
         gains = ", ".join(f"{name} = {value:.4g}" for name, value in self.controller.gains.items())
         return f"{self.verdict}: {type(self.controller).__name__} with {gains}"
 
@@ -193,9 +193,9 @@ class Proposal(ReadOnlyArrays, Pictured):
     def _margins(self) -> str:
         least = self.margins
         return (
-            f"least margins over what the recording leaves open: gain {least.gain_margin:.3g}, "
-            f"phase {least.phase_margin:.3g}°, delay {least.delay_margin:.3g} s; Ms at most "
-            f"{least.max_sensitivity:.3g}"
+            "least margins over all plants that agree with the recording: gain "
+            f"{least.gain_margin:.3g}, phase {least.phase_margin:.3g}°, delay "
+            f"{least.delay_margin:.3g} s; Ms at most {least.max_sensitivity:.3g}"
         )
 
     def _responses(self) -> list[str]:
@@ -204,16 +204,16 @@ class Proposal(ReadOnlyArrays, Pictured):
         if self.set_point is not None:
             info = self.loop.step_response().info()
             said.append(
-                f"set point: overshoot {info['overshoot']:.2g} %, settles in "
+                f"step of the set point: overshoot {info['overshoot']:.2g} %, settling time "
                 f"{info['settling_time']:.3g} s"
             )
         met = self._met()
         if self.load is not None and met is not None:
-            words = f"load of {self.load.size:.3g}: the output moves by {met.peak:.3g}"
+            words = f"load of {self.load.size:.3g}: the output deviates by {met.peak:.3g}"
             if isfinite(met.recovery_time):
-                words += f", and is back after {met.recovery_time:.3g} s"
+                words += f", and has returned after {met.recovery_time:.3g} s"
             if isinf(met.iae) and isinstance(met.steady_state, float):
-                words += f", and stays {abs(met.steady_state):.3g} away"
+                words += f", and a deviation of {abs(met.steady_state):.3g} remains"
             said.append(words)
         return said
 

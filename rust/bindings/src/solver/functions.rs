@@ -99,7 +99,10 @@ impl<'py> Callbacks<'py> {
             let value = call(event, head, &self.args)?;
             let who = || format!("event {index} at t={t}");
             numbers(&value, std::slice::from_mut(out), who, |shape| {
-                format!("event {index} returned shape {shape} at t={t}: give one number")
+                format!(
+                    "event {index} returned an array of shape {shape} at t={t}: return one \
+                    number"
+                )
             })?;
             if out.is_nan() {
                 return Err(PyValueError::new_err(format!(
@@ -118,10 +121,13 @@ impl<'py> Callbacks<'py> {
         let value = change.call1((t, y.to_pyarray(change.py())))?;
         let who = || format!("the change at t={t}");
         numbers(&value, y, who, |shape| {
-            format!("the change at t={t} returned shape {shape}: give the {dim} new values")
+            format!(
+                "the change at t={t} returned an array of shape {shape}: return the {dim} new \
+                values"
+            )
         })?;
         finite(y, |value| {
-            format!("the change at t={t} returned {value}: give finite numbers")
+            format!("the change at t={t} returned {value}: return finite numbers")
         })
     }
 }
@@ -212,7 +218,10 @@ impl<'py> PythonEquation<'py> {
             };
             let who = || format!("fun at t={t}");
             numbers(&value, &mut slope, who, |shape| {
-                format!("fun returned shape {shape} at t={t}: give the {dim} components of dy/dt")
+                format!(
+                    "fun returned an array of shape {shape} at t={t}: return the {dim} \
+                    components of dy/dt"
+                )
             })?;
             for (row, slope) in out.chunks_exact_mut(n).zip(&slope) {
                 row[node] = *slope;
@@ -256,8 +265,9 @@ fn read_slopes(
 ) -> PyResult<()> {
     let advice = |shape: String| {
         format!(
-            "fun returned shape {shape} for {n} nodes from t={t} on: with vectorized=True give \
-             (component, node) = ({dim}, {n}); leave vectorized out for a function of one t"
+            "fun returned an array of shape {shape} for {n} nodes from t={t} on: with \
+             vectorized=True return the shape ({dim}, {n}), components by nodes. For a function \
+             of one t, leave vectorized out"
         )
     };
     let who = || format!("fun for {n} nodes from t={t} on");

@@ -56,7 +56,7 @@ impl DelayPieces {
         terms: PyReadonlyArray1<'_, u64>,
         coefficients: Vector<'_>,
     ) -> PyResult<Self> {
-        let refused = || PyValueError::new_err("these are no pieces of a solution");
+        let refused = || PyValueError::new_err("the pieces of the solution are not valid");
         let spans = starts.as_array().into_iter().zip(ends.as_array());
         let (lengths, coefficients) = (terms.as_array(), coefficients.as_slice()?);
         let whole = starts.len() == ends.len() && starts.len() == terms.len();
@@ -136,7 +136,7 @@ impl DelayPieces {
         for (mut column, &time) in values.columns_mut().into_iter().zip(times.as_array()) {
             if !(time >= first && time <= last) {
                 return Err(PyValueError::new_err(format!(
-                    "t={time}: the solution is known from {first} to {last} only"
+                    "t={time}: the solution is known only from {first} to {last}"
                 )));
             }
             let index = self.history.locate(time);
@@ -282,8 +282,8 @@ fn sample(name: &str, function: &Bound<'_, PyAny>, time: f64, out: &mut [f64]) -
     let who = || format!("{name} at t={time}");
     numbers(&found, out, who, |shape| {
         format!(
-            "{name} returned shape {shape} at t={time}: give one number for each of {dim} \
-             components"
+            "{name} returned an array of shape {shape} at t={time}: return one number for each of \
+             {dim} components"
         )
     })?;
     finite(out, |value| {

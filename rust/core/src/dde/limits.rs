@@ -40,7 +40,7 @@ pub(crate) fn finite<S: Scalar>(name: &str, values: &[S]) -> Result<(), Error> {
     }
     match values.iter().find(|value| !value.is_finite()) {
         Some(value) => refuse!(
-            "{name} holds {}: give finite numbers",
+            "{name} contains {}: give finite numbers",
             if value.value().is_finite() {
                 value.slope()
             } else {
@@ -61,8 +61,8 @@ const MOST_SAMPLES: f64 = 9_007_199_254_740_992.0;
 pub(crate) fn countable(delay: f64, sample_time: f64) -> Result<(), Error> {
     refuse_if!(
         delay / sample_time > MOST_SAMPLES,
-        "delay={delay} holds {:.3e} samples of sample_time={sample_time}, which doubles do not \
-         count: lengthen the sample time, or leave it out",
+        "delay={delay} is {:.3e} samples of sample_time={sample_time}, too many to count in \
+         double precision: give a longer sample_time, or leave it out",
         delay / sample_time
     );
     Ok(())

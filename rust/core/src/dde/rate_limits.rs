@@ -62,7 +62,7 @@ impl RateLimits {
     ) -> Result<(Vec<f64>, Vec<f64>), Error> {
         refuse_if!(
             time.len() != command.len() || time.is_empty() || parts == 0,
-            "{} times, {} commands and {parts} parts: give equally many, at least one",
+            "{} times, {} commands and {parts} parts are given: give one of each for every command",
             time.len(),
             command.len()
         );

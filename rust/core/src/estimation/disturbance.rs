@@ -31,12 +31,12 @@ impl Disturbance {
     pub(super) fn check(&self) -> Result<(), Error> {
         refuse_if!(
             !(self.deviation >= 0.0 && self.deviation.is_finite()),
-            "noise of deviation {}: give a finite deviation of at least zero",
+            "the noise has a standard deviation of {}: give a finite one, zero or more",
             self.deviation
         );
         refuse_if!(
             self.deviation > 0.0 && (self.time_constant.is_nan() || self.time_constant <= 0.0),
-            "noise of time constant {} s: give a time constant above zero",
+            "the noise has a time constant of {} s: give a time constant above zero",
             self.time_constant
         );
         Ok(())

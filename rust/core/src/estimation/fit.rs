@@ -57,22 +57,23 @@ impl Model {
     /// If there is no recording, or a number is out of its range.
     pub fn new(plant: Plant, runs: Vec<Rows>, free: Free, longest: f64) -> Result<Self, Error> {
         let Some(first) = runs.first() else {
-            refuse!("no recording: give at least one")
+            refuse!("no recording was given: give at least one")
         };
         let row_time = first.row_time();
         refuse_if!(
             !(longest.is_finite() && longest >= SHORTEST_LAG * row_time),
-            "the longest delay is {longest} s and the time between rows {row_time} s: give a delay \
-             of at least a thousandth of a row"
+            "the longest delay is {longest} s, and rows are {row_time} s apart: give a delay of \
+             at least a thousandth of this time"
         );
         refuse_if!(
             free.zero && free.lags.is_empty() && !plant.takes_zero(),
-            "a zero is searched without a lag: give the plant a lag"
+            "a zero cannot be fitted without a lag: give the plant a lag"
         );
         let states = plant.states(free.lags.len());
         refuse_if!(
             states > MOST_STATES,
-            "{states} states of the plant with its lags: the likelihood takes up to {MOST_STATES}"
+            "the plant with its lags has {states} states, but the likelihood can use at most \
+             {MOST_STATES}"
         );
         Ok(Self {
             plant,
@@ -98,7 +99,8 @@ impl Model {
     fn check(&self, point: &Point) -> Result<(), Error> {
         refuse_if!(
             point.lags.len() != self.free.lags.len() || point.noise.len() != self.runs.len(),
-            "{} lags and the noise of {} recordings: this likelihood has {} lags and {} recordings",
+            "{} lags and the noise of {} recordings are given, but this likelihood has {} lags \
+             and {} recordings",
             point.lags.len(),
             point.noise.len(),
             self.free.lags.len(),
@@ -189,7 +191,7 @@ impl Model {
     ) -> Result<(&'a Rows, &'a Noise), Error> {
         let (Some(rows), Some(noise)) = (self.runs.get(run), point.noise.get(run)) else {
             refuse!(
-                "recording {run} of {}: give the number of one of them, from zero",
+                "recording number {run} does not exist: give a number below {}",
                 self.runs.len()
             )
         };

@@ -27,7 +27,7 @@ pub(super) fn kicks(
         6 => kicks_of::<6>(rows, space, delay, arrivals, sensor),
         7 => kicks_of::<7>(rows, space, delay, arrivals, sensor),
         8 => kicks_of::<8>(rows, space, delay, arrivals, sensor),
-        n => refuse!("{n} states of the plant: the likelihood takes up to 8"),
+        n => refuse!("the plant has {n} states, but the likelihood can use at most 8"),
     }?;
     if arrivals > 0.0 && !rows.commands.uncertain.is_empty() {
         found.sort_by_key(|kick| kick.row);

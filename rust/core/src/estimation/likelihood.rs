@@ -75,7 +75,8 @@ impl Noise {
         for (what, scatter) in [("rows", self.stamps), ("commands", self.arrivals)] {
             refuse_if!(
                 !(scatter.is_finite() && scatter >= 0.0),
-                "the times of {what} scatter by {scatter}: give a finite number of at least zero"
+                "the times of {what} have a standard deviation of {scatter}: give a finite \
+                 number, zero or more"
             );
         }
         self.parts().iter().try_for_each(Disturbance::check)
@@ -390,7 +391,8 @@ pub(super) fn check_count(rows: &Rows, values: &Values, by: &Derivatives) -> Res
     let (_, count) = sizes(rows, values, by);
     refuse_if!(
         used <= count,
-        "{used} rows for {count} unknowns: the likelihood needs more rows than unknowns"
+        "{used} rows are too few for {count} unknowns: the likelihood needs more rows than \
+         unknowns"
     );
     Ok(())
 }

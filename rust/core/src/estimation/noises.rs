@@ -77,7 +77,7 @@ pub(super) fn triangles(
         6 => run!(6),
         7 => run!(7),
         8 => run!(8),
-        n => refuse!("{n} states of plant and noise: the likelihood takes up to 8"),
+        n => refuse!("plant and noise have {n} states, but the likelihood can use at most 8"),
     }
 }
 

@@ -45,7 +45,7 @@ pub fn held_response(
 ) -> Result<Vec<f64>, Error> {
     refuse_if!(
         input_time.is_empty() || input.len() != input_time.len(),
-        "{} inputs at {} times: give as many, at least one",
+        "{} inputs at {} times are given: give one input for each time",
         input.len(),
         input_time.len()
     );
@@ -92,7 +92,7 @@ pub(super) fn respond<const M: usize>(
         6 => run::<6, M>,
         7 => run::<7, M>,
         8 => run::<8, M>,
-        n => refuse!("{n} states of the plant: the likelihood takes up to 8"),
+        n => refuse!("the plant has {n} states, but the likelihood can use at most 8"),
     };
     run(plants, inputs, delay, times, outs, rate, task)
 }

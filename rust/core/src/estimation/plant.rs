@@ -55,13 +55,14 @@ impl Plant {
         };
         refuse_if!(
             den.len() > MOST_STATES + 1,
-            "the denominator of the plant has degree {}: the likelihood takes up to {MOST_STATES}",
+            "the denominator of the plant has degree {}, but the likelihood can use at most \
+             {MOST_STATES}",
             den.len() - 1
         );
         let num = &num[num.iter().position(|c| *c != 0.0).unwrap_or(num.len())..];
         refuse_if!(
             num.len() > den.len(),
-            "the numerator of the plant has degree {} and the denominator {}",
+            "the numerator of the plant has degree {}, and the denominator only {}",
             num.len() - 1,
             den.len() - 1
         );

@@ -191,7 +191,7 @@ impl Model {
         if let Quantity::Lag(i) = quantity {
             refuse_if!(
                 i >= lags,
-                "lag {i} of {lags}: give the number of one of them, from zero"
+                "lag number {i} does not exist: give a number below {lags}"
             );
         }
         let (held, all) = (Some(quantity), Search::All);
@@ -248,8 +248,8 @@ impl Model {
         let Limits { floor, lower } = limits;
         refuse_if!(
             reach == 0.0 || !reach.is_finite() || !(rise > 0.0 && rise.is_finite()),
-            "an interval of half width {reach} to a rise of {rise}: give finite numbers, not zero, \
-             and a rise above it"
+            "the interval has a half width of {reach} and a rise of {rise}: give finite numbers \
+             above zero"
         );
         refuse_if!(
             floor.is_nan() || lower.is_nan(),
@@ -506,14 +506,17 @@ mod tests {
                 .to_string()
         };
         for (found, expected) in [
-            (end(Quantity::Delay, 0.0, 3.84, 0.0), "half width 0"),
-            (end(Quantity::Delay, f64::NAN, 3.84, 0.0), "half width NaN"),
-            (end(Quantity::Delay, 0.1, -1.0, 0.0), "a rise of -1"),
+            (end(Quantity::Delay, 0.0, 3.84, 0.0), "half width of 0"),
+            (
+                end(Quantity::Delay, f64::NAN, 3.84, 0.0),
+                "half width of NaN",
+            ),
+            (end(Quantity::Delay, 0.1, -1.0, 0.0), "rise of -1"),
             (
                 end(Quantity::Delay, 0.1, 3.84, f64::NAN),
                 "least end is NaN",
             ),
-            (end(Quantity::Lag(3), 0.1, 3.84, 0.0), "lag 3 of 0"),
+            (end(Quantity::Lag(3), 0.1, 3.84, 0.0), "lag number 3"),
         ] {
             assert!(found.contains(expected), "{found}");
         }

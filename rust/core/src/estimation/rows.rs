@@ -74,13 +74,14 @@ impl Rows {
         let n = self.time.len();
         refuse_if!(
             n < 2 || self.output.len() != n || self.used.len() != n,
-            "{n} times, {} outputs and {} marks of use: give two or more of each, equally many",
+            "{n} times, {} outputs and {} marks of use are given: give two or more rows with one \
+             of each",
             self.output.len(),
             self.used.len()
         );
         refuse_if!(
             !self.speed.is_empty() && self.speed.len() != n,
-            "{n} times and {} speeds: give a speed for each row, or none",
+            "{n} times and {} speeds are given: give a speed for each row, or none",
             self.speed.len()
         );
         if let Some(speed) = self.speed.iter().find(|speed| !speed.is_finite()) {
@@ -89,7 +90,7 @@ impl Rows {
         let commands = &self.commands;
         refuse_if!(
             commands.time.is_empty() || commands.time.len() != commands.value.len(),
-            "{} times of commands and {} commands: give equally many, at least one",
+            "{} times and {} commands are given: give one time for each command",
             commands.time.len(),
             commands.value.len()
         );
@@ -115,14 +116,15 @@ impl Rows {
         for (_, _, deviation) in &commands.uncertain {
             refuse_if!(
                 !(deviation.is_finite() && *deviation >= 0.0),
-                "a computed command has an error of {deviation}: give a finite number of at least zero"
+                "a computed command has an error of {deviation}: give a finite number, zero or \
+                 more"
             );
         }
         for pair in commands.uncertain.windows(2) {
             refuse_if!(
                 pair[1].1 < pair[0].1,
-                "the computed command that ends at {} s follows one that ends at {} s: order them \
-                 by their ends",
+                "the computed command that ends at {} s follows one that ends at {} s: sort the \
+                 commands by their ends",
                 pair[1].1,
                 pair[0].1
             );

@@ -48,7 +48,8 @@ pub fn whiten(
 ) -> Result<Vec<f64>, Error> {
     refuse_if!(
         time.is_empty() || !columns.len().is_multiple_of(time.len()),
-        "{} times and columns of {} values in all: give each column as many values as times",
+        "{} times and columns of {} values in total are given: give each column one value for \
+         each time",
         time.len(),
         columns.len()
     );
@@ -118,7 +119,7 @@ pub(super) fn whiten_in_place(
         6 => run!(6),
         7 => run!(7),
         8 => run!(8),
-        n => refuse!("{n} states of plant and noise: the likelihood takes up to 8"),
+        n => refuse!("plant and noise have {n} states, but the likelihood can use at most 8"),
     }
 }
 

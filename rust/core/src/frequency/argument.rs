@@ -53,7 +53,7 @@ pub fn argument(h: &QuasiPolynomial, omega: &[f64], task: &Task) -> Result<Vec<f
     };
     refuse_if!(
         !(highest * centre).is_finite(),
-        "omega={highest:e}: the phase, {centre} s times that, is beyond 1e308"
+        "omega={highest:e}: the phase, {centre} s times omega, is beyond 1e308"
     );
     let (far, c) = beyond_lower_powers(&h);
     let only_leading = QuasiPolynomial::new(
@@ -137,8 +137,8 @@ impl<'a> Way<'a> {
                 .rev()
                 .fold(0.0, |sum, c| sum * end + c))
             .is_finite(),
-            "omega={end:e}: its powers leave the range of doubles, and no term dominates the \
-             others up to there; ask for lower frequencies or choose another unit of time"
+            "omega={end:e}: powers of this frequency exceed double precision before one term \
+             dominates the others. Give lower frequencies, or choose another unit of time"
         );
         let mut open = vec![(self.at, end)];
         while let Some((a, b)) = open.pop() {
@@ -151,8 +151,8 @@ impl<'a> Way<'a> {
             }
             refuse_if!(
                 self.intervals > MOST,
-                "the phase takes more than {MOST} intervals up to {end:e} rad/s, since no term \
-                 dominates the others near {a:e}: ask for lower frequencies"
+                "up to {end:e} rad/s, the phase needs more than {MOST} intervals, because no term \
+                 dominates the others near {a:e}: give lower frequencies"
             );
             match self.turned(a, b) {
                 Some(turned) => self.argument += turned,

@@ -74,9 +74,8 @@ fn crossings_of_gain(
         .collect();
     refuse_if!(
         listed.is_empty(),
-        "for every {} from {low} to {high} the leading coefficient does not dominate the later \
-         ones of the highest power of s: chains of infinitely many roots may reach the imaginary \
-         axis",
+        "for every {} from {low} to {high}, chains of infinitely many roots may reach the \
+         imaginary axis. The highest power of s has large delayed coefficients",
         equation.name
     );
     let mut crossings = Vec::new();

@@ -42,8 +42,8 @@ pub(super) fn crossings_of_delay(
     let (lead, rest) = equation.leading(low, high)?;
     refuse_if!(
         lead <= rest,
-        "the equation is neutral and its leading coefficient does not dominate the later ones: \
-         chains of infinitely many roots may reach the imaginary axis for some {}",
+        "the equation is neutral, and its leading coefficient does not dominate the other \
+         coefficients. So chains of infinitely many roots may reach the imaginary axis for some {}",
         equation.name
     );
     let passages = passages(equation, task)?;
@@ -60,7 +60,7 @@ pub(super) fn crossings_of_delay(
         .sum();
     refuse_if!(
         many > MOST,
-        "more than {MOST} crossings: choose a smaller range of {}",
+        "there are more than {MOST} crossings: give a smaller range of {}",
         equation.name
     );
     let mut found = Vec::with_capacity(many as usize);
@@ -90,11 +90,11 @@ pub fn delay_margin(family: &Family, start: f64, task: &Task) -> Result<f64, Err
     let name = equation.name;
     refuse_if!(
         equation.slopes().first().is_some_and(|slope| *slope < 0.0),
-        "a delay falls as {name} grows: the equation has no delay margin"
+        "a delay decreases if {name} increases, so the equation has no delay margin"
     );
     refuse_if!(
         !equation.is_stable_at(start, task)?,
-        "not stable at {name}={start}: it has no delay margin"
+        "the equation is not stable at {name}={start}, so it has no delay margin"
     );
     let (_, high) = stable_range_of(&equation, (start, start), task)?;
     Ok(high - start)
@@ -142,7 +142,7 @@ fn passages(equation: &Equation<'_>, task: &Task) -> Result<Vec<Passage>, Error>
     let at_zero = parts.iter().flat_map(|part| part.coefficients().iter());
     refuse_if!(
         at_zero.filter_map(|row| row.first()).sum::<f64>() == 0.0,
-        "a root stays at s = 0 whatever {name} is: divide the equation by s"
+        "a root stays at s = 0 for all values of {name}: divide the equation by s"
     );
     let [a, b] = &parts[..] else {
         let multiples: Vec<f64> = slopes.iter().map(|slope| slope - early).collect();
@@ -151,8 +151,8 @@ fn passages(equation: &Equation<'_>, task: &Task) -> Result<Vec<Passage>, Error>
     let (frequencies, searched) = gain_crossovers(b, a, task)?;
     refuse_if!(
         searched < f64::INFINITY,
-        "neither the terms with {name} nor those without dominate the others at high \
-         frequencies: there is no end to the frequencies at which roots may cross"
+        "at high frequencies, neither the terms with {name} nor the terms without {name} dominate \
+         the others, so roots may cross at infinitely many frequencies"
     );
     let mut difference = DifferenceOfSquares::new(a, b);
     let sizes = moduli(a);
@@ -164,8 +164,8 @@ fn passages(equation: &Equation<'_>, task: &Task) -> Result<Vec<Passage>, Error>
             // Six digits are what is known of a multiple zero.
             let omega = format!("{omega:.5e}").parse().unwrap_or(omega);
             refuse!(
-                "a root stays at omega = {omega} rad/s whatever {name} is: divide the equation \
-                 by the common factor of its terms"
+                "a root stays at omega = {omega} rad/s for all values of {name}: divide the \
+                 equation by the common factor of its terms"
             );
         }
         let quotient = over(b, a, omega);

@@ -19,7 +19,7 @@ impl<'a> Equation<'a> {
         match family.names() {
             [name] => Ok(Self { family, name }),
             names => refuse!(
-                "{} parameters have no value ({}): one number varies at a time",
+                "{} parameters have no value ({}), but only one can vary: give the others a value",
                 names.len(),
                 names.join(", ")
             ),
@@ -58,8 +58,8 @@ impl<'a> Equation<'a> {
         let is_delay = self.slopes().iter().any(|slope| *slope != 0.0);
         refuse_if!(
             is_delay && self.highest_power() > 0,
-            "{} is both a factor and a delay: crossings are those of a gain, or of a delay; a \
-             map over it and a second parameter shows its counts",
+            "{} is both a factor and a delay, but crossings need a parameter that is only one of \
+             the two. A map over this parameter and a second one is possible",
             self.name
         );
         Ok(is_delay)
@@ -133,8 +133,8 @@ impl<'a> Equation<'a> {
         let lead = f64::abs(lead);
         refuse_if!(
             !is_one || lead == 0.0,
-            "for some {} from {low} on the highest power of s is not without further delay: \
-             such an equation is not causal and has infinitely many unstable roots",
+            "for some {} from {low} on, the highest power of s appears only with a delay. Such an \
+             equation is not causal, and has infinitely many unstable roots",
             self.name
         );
         Ok((lead * (1.0 - super::chains::ROOM), all - lead))

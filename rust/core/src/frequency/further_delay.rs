@@ -103,7 +103,7 @@ impl<'a> Search<'a> {
         let timing = Timing::new(held.delay(), held.sample_time());
         refuse_if!(
             loses(held, task)? != Some(false),
-            "the loop is not stable at a delay of {} s, to working precision",
+            "the loop is not stable at a delay of {} s, within rounding errors",
             held.delay()
         );
         Ok(Self {
@@ -159,7 +159,8 @@ impl<'a> Search<'a> {
             }
         }
         refuse!(
-            "the loop is stable with delays up to {MOST:e} samples, and it is not known further on"
+            "the loop is stable with delays up to {MOST:e} samples. Longer delays were not \
+             examined"
         )
     }
 
@@ -244,8 +245,8 @@ impl<'a> Search<'a> {
             };
             refuse_if!(
                 found.is_none(),
-                "the loop is stable with delays from {} to {stable} s, and it is not known \
-                 further on: a pole is closer to the unit circle than rounding errors",
+                "the loop is stable with delays from {} to {stable} s. Above, its stability is \
+                 not known, because a pole is closer to the unit circle than rounding errors",
                 self.held.delay()
             );
             return Ok(found);

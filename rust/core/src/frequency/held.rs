@@ -82,8 +82,9 @@ pub fn held_margins_of_stable(
 fn factors(numbers: &HeldNumbers, range: (f64, f64), task: &Task) -> Result<Vec<Crossing>, Error> {
     let Some(factors) = numbers.factors(range, task)? else {
         refuse!(
-            "double precision cannot determine the phase crossovers of this sampled loop: a pole and a \
-             zero of its loop gain may cancel on the unit circle; change a number by a little"
+            "double precision cannot determine the phase crossovers of this sampled loop. A pole \
+             and a zero of its loop gain may cancel on the unit circle. Change a parameter by a \
+             little"
         );
     };
     Ok(factors)

@@ -56,7 +56,7 @@ pub fn held_phase(held: HeldLoop<'_>, omega: &[f64]) -> Result<Vec<f64>, Error> 
         if to > from {
             let [of_a, of_b] = [&a, &b].map(|p| turned(&numbers, p, from, to, true));
             let (Some(of_a), Some(of_b)) = (of_a, of_b) else {
-                refuse!("the phase of the loop gain cannot be followed up to {to} rad/s");
+                refuse!("up to {to} rad/s, the phase of the loop gain cannot be computed");
             };
             rest += of_b - of_a;
             from = to;
@@ -75,8 +75,8 @@ fn within(numbers: &HeldNumbers, omega: &[f64]) -> Result<Vec<f64>, Error> {
         .find(|omega| !(0.0..=top * (1.0 + ROUNDING)).contains(*omega))
     {
         refuse!(
-            "omega={beyond} rad/s: a loop sampled every {sample_time} s has frequencies from 0 to \
-             {top:.6} rad/s"
+            "omega={beyond} rad/s: a loop with a sample time of {sample_time} s has frequencies \
+             from 0 to {top:.6} rad/s"
         );
     }
     Ok(omega.iter().map(|omega| omega.min(top)).collect())

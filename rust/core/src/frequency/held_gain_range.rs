@@ -37,9 +37,9 @@ pub fn gain_range_held(
     while reach < FAR * size && (low.is_infinite() || high.is_infinite()) {
         let Some(found) = held.gain_crossings(slope, (-reach, reach), task)? else {
             refuse!(
-                "double precision cannot determine the gains up to {reach:e} at which a pole of this \
-                 sampled loop is on the unit circle: a pole and a zero of its loop gain may cancel \
-                 there"
+                "double precision cannot determine at which gains up to {reach:e} a pole of this \
+                 sampled loop is on the unit circle. A pole and a zero of its loop gain may \
+                 cancel there"
             );
         };
         for at in found {

@@ -148,7 +148,7 @@ pub fn held_range(
     }
     refuse_if!(
         loses(held, task)? != Some(false),
-        "the loop is not stable at {start}, to working precision"
+        "the loop is not stable at {start}, within rounding errors"
     );
     let keeps_sign = (low == 0.0 || high == 0.0) && start != 0.0;
     let mut search = Search {
@@ -280,8 +280,8 @@ impl<M: Members> Search<'_, M> {
             return self.lost(value, sign);
         }
         refuse!(
-            "no loss of stability was found from {} to {value} in {STEPS} intervals, but it may \
-             occur further on: look at single values with is_stable()",
+            "from {} to {value} the loop was stable in {STEPS} intervals. To examine values \
+             above, use is_stable()",
             self.start
         )
     }
@@ -334,8 +334,9 @@ impl<M: Members> Search<'_, M> {
         let found = loss_beside(&mut |value| self.loses(value), stable, (size, HIDDEN))?;
         let Some(end) = found else {
             refuse!(
-                "the loop is stable from {} to {stable}, and it is not known further on: a pole \
-                 is closer to the unit circle than rounding errors, or double precision does not suffice",
+                "the loop is stable from {} to {stable}. Above, its stability is not known, \
+                 because a pole is closer to the unit circle than rounding errors, or double \
+                 precision is not sufficient",
                 self.start
             );
         };
@@ -378,7 +379,7 @@ impl<M: Members> Search<'_, M> {
         let rests = loss <= RESTS * third || (loss <= 0.5 * before.abs() && third > 2.0 * loss);
         refuse_if!(
             !rests,
-            "the loop is stable from {} to {last}, and it is not known further on",
+            "the loop is stable from {} to {last}. Above, its stability is not known",
             self.start
         );
         Ok(bound)
@@ -394,8 +395,8 @@ impl<M: Members> Search<'_, M> {
             };
             refuse_if!(
                 !is_kept,
-                "the loop is stable from {} to {value}, with {MOST_SAMPLES} samples in the delay, and \
-                 it is not known further on",
+                "the loop is stable from {} to {value}, where the delay has {MOST_SAMPLES} \
+                 samples. Above, its stability is not known",
                 self.start
             );
         }

@@ -234,22 +234,21 @@ pub(super) fn least(
 fn refuse_what_has_none(n: &QuasiPolynomial, d: &QuasiPolynomial) -> Result<(), Error> {
     refuse_if!(
         d.is_zero(),
-        "the loop gain is infinite everywhere: its denominator is zero"
+        "the denominator of the loop gain is zero, so the loop gain is infinite"
     );
     refuse_if!(
         n.degree() > d.degree(),
-        "the loop gain grows with frequency (degree {} over {}): any delay, however small, \
-         makes such a loop unstable, so it has no margins; add the roll-off that the real loop \
-         has, for example a DerivativeFilter",
+        "the loop gain grows with frequency (degree {} over {}), so any delay makes the loop \
+         unstable, and there are no margins. Add the roll-off that the real loop has, for example \
+         a DerivativeFilter",
         n.degree(),
         d.degree()
     );
     let (own, other) = (first_delay(d), first_delay(n));
     refuse_if!(
         d.kind() == Kind::Advanced || other < own,
-        "the loop gain answers its input before it comes (the smallest delay of the \
-         denominator is {own} s, that of the numerator {other} s, and the denominator is {}): \
-         such a loop is not causal and has no margins",
+        "the loop gain is not causal, so it has no margins. The smallest delay of its denominator \
+         is {own} s, the smallest delay of its numerator {other} s, and the denominator is {}",
         d.kind().name()
     );
     Ok(())

@@ -140,9 +140,9 @@ fn common(slopes: &[f64], name: &str) -> Result<(f64, Vec<usize>), Error> {
         .map(|slope| format!("{slope} {name}"))
         .collect();
     refuse!(
-        "{name} enters as several delays ({}): its crossings are known where these are whole \
-         multiples of one, up to {MOST} of it; a map over {name} and a second parameter shows its \
-         counts",
+        "{name} appears in several delays ({}). Crossings can be found only if these are whole \
+         multiples of one delay, at most {MOST} times as long. A map over {name} and a second \
+         parameter also works",
         shown.join(", ")
     )
 }
@@ -205,8 +205,8 @@ fn highest(parts: &[QuasiPolynomial], name: &str) -> Result<f64, Error> {
         return Ok(radius);
     }
     refuse!(
-        "the terms with {name} dominate the leading one at high frequencies: there is no end to the \
-         frequencies at which roots may cross"
+        "at high frequencies, the terms with {name} dominate the leading term, so roots may cross \
+         at infinitely many frequencies"
     )
 }
 

@@ -195,14 +195,14 @@ impl Far {
         let reserve = lead.reserve(0.0);
         refuse_if!(
             reserve <= 0.0,
-            "the largest gain over frequency has no bound: infinitely many poles come close to the \
-             imaginary axis, or cross it, under small changes of the delays"
+            "the largest gain over frequency is not bounded. Infinitely many poles come close to \
+             the imaginary axis, or cross it after small changes of the delays"
         );
         match lead.largest_ratio() {
             Some(most) => Ok(Self { most, reserve }),
             None => refuse!(
-                "the largest gain at high frequencies is not known where several delays are in the \
-                 highest power of s of both numerator and denominator: add the roll-off that the \
+                "the largest gain at high frequencies is not known, because the highest power of \
+                 s has several delays in numerator and denominator. Add the roll-off that the \
                  real system has"
             ),
         }

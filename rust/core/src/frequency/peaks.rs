@@ -104,8 +104,8 @@ pub(super) fn highest(
         }
     }
     refuse!(
-        "the largest gain over frequency, {:.6e} near {:.6e} rad/s, does not converge: a pole may be \
-         on the imaginary axis to rounding",
+        "the largest gain over frequency, {:.6e} near {:.6e} rad/s, does not converge, because a \
+         pole may be on the imaginary axis within rounding errors",
         best.value,
         best.omega
     )

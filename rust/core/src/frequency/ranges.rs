@@ -113,8 +113,8 @@ pub fn corner_range(
     }
     refuse_if!(
         highest == f64::INFINITY,
-        "the loop gain does not stay below one at high frequencies for every corner of the \
-         filter: the range of its corner is known where it does"
+        "the range of the corner is not known, because for some corners the loop gain does not \
+         stay below one at high frequencies"
     );
     // Im X Im Y = Re(X conj Y − X Y)/2.
     let both = |x: &TwoSided, y: &TwoSided| x.times(&y.mirrored()).plus(-1.0, &x.times(y));
@@ -213,7 +213,10 @@ impl<'a> Search<'a> {
             }
             width *= GROWTH;
         }
-        refuse!("the loop is stable from {name}={value} to {reach}, and it is not known further on")
+        refuse!(
+            "the loop is stable from {name}={value} to {reach}. Beyond, its stability is not \
+            known"
+        )
     }
 
     /// All crossings there are from the value on, where one search finds them.

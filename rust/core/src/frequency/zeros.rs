@@ -80,8 +80,8 @@ pub(super) fn zeros_between(
         }
         refuse_if!(
             looked_at > MOST,
-            "between {low:e} and {high:e} rad/s there are too many crossings to list: the delay \
-             is very long for such frequencies, or gain or phase cross on a whole range of them"
+            "between {low:e} and {high:e} rad/s there are too many crossings to list. Either the \
+             delay is very long for such frequencies, or gain or phase cross over a whole range"
         );
         let (m, r) = (0.5 * (a + b), 0.5 * (b - a));
         let here = f.taylor(m);
@@ -89,8 +89,8 @@ pub(super) fn zeros_between(
         let (value, error) = (here.values[0].abs(), here.errors[0]);
         refuse_if!(
             !change.is_finite() || !error.is_finite(),
-            "at {b:e} rad/s powers of the frequency leave the range of doubles: choose another \
-             unit of time"
+            "at {b:e} rad/s, powers of the frequency exceed double precision: choose another unit \
+             of time"
         );
         if value > change + error {
             continue;

@@ -72,7 +72,7 @@ impl ControlLoop {
         });
         if let Some(place) = none {
             refuse!(
-                "{place:?}: the characteristic function of a continuous loop has no such number"
+                "{place:?} is not a parameter of the characteristic function of a continuous loop"
             );
         }
         let [b, a] = self.ratio(values)?;

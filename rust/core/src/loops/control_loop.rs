@@ -139,7 +139,8 @@ impl ControlLoop {
     ) -> Result<Self, Error> {
         refuse_if!(
             values.plant.len() != names.len() || values.controller.len() != controller.count(),
-            "{} numbers of the plant and {} of the controller: there are {} and {}",
+            "{} parameters of the plant and {} of the controller are given, but there are {} and \
+             {}",
             values.plant.len(),
             values.controller.len(),
             names.len(),
@@ -207,7 +208,7 @@ impl ControlLoop {
             (.., "limit" | "limit_high") => Ok(Place::Limit),
             (.., "limit_low") => Ok(Place::Low),
             (.., "rate_limit") => Ok(Place::Rate),
-            _ => refuse!("this loop has no number {name:?}"),
+            _ => refuse!("this loop has no parameter {name:?}"),
         }
     }
 

@@ -41,12 +41,12 @@ impl ControlLoop {
         let controller = self.controller().equations(&values.controller, sampled);
         refuse_if!(
             !plant.d.is_zero() && !controller.q.is_zero(),
-            "the plant passes its command straight to its output, so its output has no ideal \
-             derivative: give the controller a DerivativeFilter"
+            "the plant has direct feedthrough, so its output has no ideal derivative: give the \
+             controller a DerivativeFilter"
         );
         refuse_if!(
             !plant.d.is_zero() && input == Input::Load,
-            "the plant passes its command straight to its output: it has no response to a load here"
+            "the plant has direct feedthrough, so its response to a load cannot be computed"
         );
         let first = plant.b.len();
         let tracking = self.controller().tracking(&values.controller);

@@ -115,7 +115,7 @@ impl<S: Sampled> SampledFilter<S> {
         let n = g.len();
         refuse_if!(
             f.len() != n * n || c.len() != n,
-            "a filter with {} entries of F and {} of C for {n} states",
+            "the filter has {} entries of F and {} of C, which do not fit {n} states",
             f.len(),
             c.len()
         );
@@ -147,7 +147,7 @@ impl<S: Sampled> SampledFilter<S> {
         let is_solved = S::solve(transposed.collect(), &mut row) && S::solve(left, &mut columns);
         refuse_if!(
             !is_solved,
-            "the filter has no discrete form by this rule for its sample_time"
+            "for this sample_time, the filter has no discrete form by this rule"
         );
         let ([row], Some(into)) = (row, columns.pop()) else {
             refuse!("a filter without states");

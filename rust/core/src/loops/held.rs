@@ -93,8 +93,8 @@ impl ControlLoop {
     ) -> Result<HeldRows, Error> {
         refuse_if!(
             self.controller().is_discretised(),
-            "a map cannot run a filter in samples: leave its discretisation out, or take loops one \
-             by one"
+            "a map cannot have a filter that runs on samples: leave discretisation out, or test \
+             the loops one by one"
         );
         let count = moving
             .iter()

@@ -83,8 +83,8 @@ impl HeldPlane {
     ) -> Result<[Boundaries; 2], Error> {
         let Some(along) = self.along else {
             refuse!(
-                "neither axis is a gain: the crossings of a sampled loop are found along a gain of \
-                 its controller or plant"
+                "neither axis is a gain, but crossings of a sampled loop can be found only along \
+                 a gain of its controller or plant: give a gain as one axis"
             );
         };
         let columns = self.columns.as_ref().map(HeldRows::view);

@@ -118,11 +118,11 @@ impl Plant {
                     num: scaled(gain, &given.num),
                     den: given.den.clone(),
                 }),
-                _ => refuse!("the polynomials of this plant are needed with its numbers"),
+                _ => refuse!("the polynomials of this plant are not known without its parameters"),
             },
             Self::Delayed(..) => refuse!(
-                "the plant has delays inside, so it has no finite state space, which is needed \
-                 here: give a plant that is rational except for one delay in series"
+                "the plant has delays inside, so it has no finite state space, which this \
+                 function needs: give a plant that is rational except for one delay in series"
             ),
         }
     }
@@ -151,13 +151,13 @@ impl<S: Number> Fraction<S> {
     pub fn state_space(&self) -> Result<StateSpace<S>, Error> {
         let (a, b) = (led(&self.den), led(&self.num));
         let Some((lead, poles)) = a.split_first() else {
-            refuse!("a plant without a denominator: give at least one coefficient");
+            refuse!("the plant has no denominator: give at least one coefficient");
         };
         let n = poles.len();
         refuse_if!(
             b.len() > n + 1,
-            "the numerator has degree {} and the denominator {n}: a plant cannot differentiate its \
-             command",
+            "the numerator has degree {}, and the denominator only {n}, but a plant cannot \
+             differentiate its command",
             b.len() - 1
         );
         let poles: Vec<S> = poles.iter().map(|c| c.clone() / lead.clone()).collect();
@@ -198,8 +198,8 @@ impl<S: Number> Fraction<S> {
             S::from(0.0)
         } else if zeros.is_zero() {
             refuse!(
-                "initial_output={output}: this plant has no steady gain and rests only at zero, \
-                 start it there"
+                "initial_output={output}: this plant has no steady gain, so it rests only at \
+                 zero. Give 0"
             );
         } else {
             output_entry.clone() * poles / zeros

@@ -74,7 +74,7 @@ impl ControlLoop {
         task: &Task,
     ) -> Result<(f64, f64), Error> {
         let Some(value) = self.values().get(place) else {
-            refuse!("{place:?}: the loop has no such number");
+            refuse!("the loop has no parameter {place:?}");
         };
         let bounds = self.bounds(place, value);
         if self.values().sample_time.is_some() {

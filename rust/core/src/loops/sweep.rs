@@ -69,8 +69,8 @@ impl<'a> SweptLoops<'a> {
         values.given = given.or_else(own);
         refuse_if!(
             of.controller().is_discretised() && values.sample_time.is_some(),
-            "a sweep cannot run a filter in samples: leave its discretisation out, or take loops one \
-             by one"
+            "a sweep cannot have a filter that runs on samples: leave discretisation out, or \
+             simulate the loops one by one"
         );
         Ok(Self {
             of,

@@ -92,7 +92,10 @@ impl QuasiPolynomial {
     /// # Errors
     /// [`Error::Argument`] when `factor` is not finite or a coefficient overflows.
     pub fn scale(&self, factor: f64) -> Result<Self, Error> {
-        refuse_if!(!factor.is_finite(), "factor {factor}: give a finite number");
+        refuse_if!(
+            !factor.is_finite(),
+            "a factor is {factor}: give a finite number"
+        );
         let mut rows = self.rows();
         for value in rows.iter_mut().flat_map(|(row, _)| row) {
             *value *= factor;
@@ -124,7 +127,9 @@ impl QuasiPolynomial {
                 what: "the product of two quasi-polynomials",
                 limit: MAX_COEFFICIENTS as u64,
                 unit: "coefficients",
-                advice: "keep it factored: the roots of a product are those of its factors".into(),
+                advice: "keep the factors separate, because the roots of a product are the roots \
+                    of its factors"
+                    .into(),
             });
         }
         let mut rows = Vec::with_capacity(self.delays.len() * other.delays.len());
@@ -133,7 +138,7 @@ impl QuasiPolynomial {
                 let delay = first + second;
                 refuse_if!(
                     !delay.is_finite(),
-                    "delays {first} s and {second} s add up to more than double precision holds"
+                    "the sum of the delays {first} s and {second} s exceeds double precision"
                 );
                 rows.push((convolve(a, b), delay));
             }
@@ -173,7 +178,7 @@ impl QuasiPolynomial {
                     what: "the derivative",
                     limit: MAX_ORDER.into(),
                     unit: "orders",
-                    advice: "take a lower one".into(),
+                    advice: "give a lower order".into(),
                 });
             }
             for (row, delay) in &mut rows {

@@ -30,7 +30,7 @@ impl QuasiPolynomial {
     pub fn new(coefficients: Vec<Vec<f64>>, delays: Vec<f64>) -> Result<Self, Error> {
         refuse_if!(
             coefficients.len() != delays.len(),
-            "{} rows of coefficients but {} delays: give one delay for every row",
+            "{} rows of coefficients and {} delays are given: give one delay for each row",
             coefficients.len(),
             delays.len()
         );
@@ -39,10 +39,10 @@ impl QuasiPolynomial {
             "a quasi-polynomial needs at least one row of coefficients and its delay"
         );
         if let Some(delay) = delays.iter().find(|d| !(d.is_finite() && **d >= 0.0)) {
-            refuse!("delay {delay} s: delays must be finite and not negative");
+            refuse!("a delay is {delay} s, but delays must be finite and not negative");
         }
         if let Some(value) = coefficients.iter().flatten().find(|c| !c.is_finite()) {
-            refuse!("coefficient {value}: coefficients must be finite");
+            refuse!("a coefficient is {value}, but coefficients must be finite");
         }
         let rows = coefficients.into_iter().zip(delays).collect();
         Self::from_rows(rows)

@@ -44,7 +44,7 @@ impl Region {
             let increasing = low < high && low < f64::INFINITY && high > f64::NEG_INFINITY;
             refuse_if!(
                 !increasing,
-                "{name}=({low}, {high}): a range needs a lower end below its upper end"
+                "{name}=({low}, {high}): give a range whose lower end is below its upper end"
             );
         }
         Ok(())

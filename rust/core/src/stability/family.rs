@@ -88,14 +88,16 @@ impl Family {
     /// [`Error::TooMuch`] for too many terms.
     pub fn new(names: Vec<String>, terms: Vec<Term>) -> Result<Self, Error> {
         if let Some(name) = repeated(&names) {
-            refuse!("parameter {name} is given twice: give every parameter its own name");
+            refuse!("the parameter {name} is given twice: give every parameter its own name");
         }
         if terms.len() > MAX_TERMS {
             return Err(Error::TooMuch {
                 what: "the family",
                 limit: MAX_TERMS as u64,
                 unit: "terms",
-                advice: "keep it factored: the roots of a product are those of its factors".into(),
+                advice: "keep the factors separate, because the roots of a product are the roots \
+                    of its factors"
+                    .into(),
             });
         }
         let mut family = Self {
@@ -130,12 +132,12 @@ impl Family {
             .chain([&term.delay.constant])
             .chain(&term.delay.slopes);
         if let Some(number) = numbers.find(|number| !number.is_finite()) {
-            refuse!("{number} in a term: coefficients and delays must be finite");
+            refuse!("a term contains {number}, but coefficients and delays must be finite");
         }
         let highest = term.exponents.iter().fold(term.power, |a, b| a.max(*b));
         refuse_if!(
             highest > MAX_POWER,
-            "a power of {highest}: give powers up to {MAX_POWER}"
+            "a parameter has the power {highest}: give powers up to {MAX_POWER}"
         );
         Ok(())
     }
@@ -263,13 +265,13 @@ impl Family {
     fn check_values(&self, values: &[f64]) -> Result<(), Error> {
         refuse_if!(
             values.len() != self.names.len(),
-            "{} values for {} parameters ({}): give one value for each parameter",
+            "{} values are given for {} parameters ({}): give one value for each parameter",
             values.len(),
             self.names.len(),
             self.names.join(", ")
         );
         match self.names.iter().zip(values).find(|(_, v)| !v.is_finite()) {
-            Some((name, value)) => refuse!("{name}={value}: parameters must be finite"),
+            Some((name, value)) => refuse!("{name}={value}: give a finite value"),
             None => Ok(()),
         }
     }
@@ -297,7 +299,7 @@ impl Family {
         } else {
             format!(" at {}", place.join(", "))
         };
-        refuse!("a delay is {value} s{place}: delays must not be negative")
+        refuse!("a delay is {value} s{place}, but delays must not be negative")
     }
 }
 

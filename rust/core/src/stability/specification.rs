@@ -93,12 +93,12 @@ impl Specification {
         };
         refuse_if!(
             !(ratio > 0.0 && ratio < 1.0),
-            "a damping ratio of {ratio}: give one between 0 and 1"
+            "the damping ratio is {ratio}: give a ratio between 0 and 1"
         );
         refuse_if!(
             !(self.decay >= 0.0 && horizon > self.decay && horizon.is_finite()),
-            "a damping ratio for roots right of -{horizon} with decay={}: the horizon must be \
-             finite and beyond the decay, which must not be negative",
+            "the horizon is {horizon} and decay={}: give a finite horizon above the decay, and a \
+             decay of zero or more",
             self.decay
         );
         Ok(())

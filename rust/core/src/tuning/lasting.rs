@@ -68,7 +68,8 @@ impl Fundamental {
         for matrix in [&model.a, &undelayed] {
             let Some(found) = eigenvalues(matrix, n) else {
                 refuse!(
-                    "the eigenvalues of the loop are not found: choose units in which its numbers are moderate"
+                    "the eigenvalues of the loop were not found: choose other units for its gains \
+                     and time constants"
                 );
             };
             rate = found.iter().map(|value| value.norm()).fold(rate, f64::max);

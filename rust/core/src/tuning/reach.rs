@@ -67,14 +67,14 @@ impl<'a> Search<'a> {
     /// [`Error::Argument`] where the response to a load does not follow from a free gain.
     pub(super) fn new(posed: &'a Posed, weights: Weights, task: &'a Task) -> Result<Self, Error> {
         let Some(nominal) = posed.loops.first() else {
-            refuse!("no loops: give one at least");
+            refuse!("no loop was given: give at least one");
         };
         let names = nominal.controller().kind.gains();
         let lead = names.get(posed.lead()).copied().unwrap_or("");
         refuse_if!(
             weights.load > 0.0 && !posed.free.contains(&posed.lead_of_load()),
-            "the response to a load follows from {}, which is given: leave it free, or choose \
-             another objective",
+            "the response to a load depends only on {}, which is fixed: leave this gain free, or \
+             choose another objective",
             names.get(posed.lead_of_load()).copied().unwrap_or(lead)
         );
         let seen = posed.loops.iter().take(posed.first.max(1)).enumerate();
@@ -131,8 +131,9 @@ impl<'a> Search<'a> {
             }
             refuse_if!(
                 is_open,
-                "nothing limits the gains of this loop: Ms stays below {most} for all of them; give \
-                 it the delay or the lags that the real loop has, or ranges="
+                "nothing limits the gains of this loop, because Ms stays below {most} for all \
+                 gains. Give the loop the delay or the lags that the real loop has, or give \
+                 ranges="
             );
             return Ok(Some((ray, (from, end))));
         }

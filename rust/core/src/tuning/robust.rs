@@ -122,8 +122,8 @@ impl Search<'_> {
             }
         }
         refuse!(
-            "no gains with Ms of at most {} over all of {} loops were found: ask for less, or take a \
-             smaller region",
+            "no gains have Ms of at most {} in all {} loops: allow a larger Ms, or give a smaller \
+             region",
             self.posed.demands.max_sensitivity,
             self.posed.loops.len()
         )
@@ -268,8 +268,8 @@ impl Search<'_> {
                 self.seen[known].1.add(peak.omega, self.task)?;
             } else if self.checks_all {
                 refuse!(
-                    "no gains were found with which all loops are stable: give a smaller region, or \
-                     ranges="
+                    "no gains were found for which all loops are stable: give a smaller region, \
+                     or give ranges="
                 );
             } else {
                 self.checks_all = true;
@@ -288,8 +288,8 @@ impl Search<'_> {
         let Some(start) = found else {
             let demands = &self.posed.demands;
             refuse!(
-                "no gains were found with Ms of at most {}{}: ask for less, take a controller with a \
-                 derivative, or give ranges=",
+                "no gains were found with Ms of at most {}{}: allow a larger Ms, use a controller \
+                 with a derivative, or give ranges=",
                 demands.max_sensitivity,
                 if demands.has_others() {
                     " that meet the other demands"

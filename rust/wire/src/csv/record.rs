@@ -84,7 +84,7 @@ fn with_quotes<'a>(
             }
             None | Some((b'\n' | b'\r', _)) => break,
             Some(_) => {
-                let reason = "behind the closing quote of a cell stands no separator";
+                let reason = "a cell continues after its closing quote";
                 return Err(Quotes { lines, reason });
             }
         }

@@ -58,8 +58,8 @@ pub enum Fault {
     },
     /// More cells than the header has names.
     #[error(
-        "line {line}: {cells} cells under {width} column names; if commas stand for decimal \
-         points, write points, or separate the columns by semicolons"
+        "line {line} has {cells} cells, but there are {width} column names. If commas are decimal \
+         marks, write points, or separate the columns by semicolons"
     )]
     Wide {
         /// The line.
@@ -70,7 +70,7 @@ pub enum Fault {
         width: usize,
     },
     /// A column without a cell.
-    #[error("line {line}: {cells} cells, so the column {name} has none")]
+    #[error("line {line} has {cells} cells, so the cell of the column {name} is missing")]
     Missing {
         /// The line.
         line: usize,
@@ -92,7 +92,10 @@ pub enum Fault {
         reason: String,
     },
     /// A number that is not finite.
-    #[error("line {line}: {name} is {value}; leave the row out, or read a window without it")]
+    #[error(
+        "line {line}: {name} is {value}. Leave this row out, or choose a window without this \
+        row"
+    )]
     NotFinite {
         /// The line.
         line: usize,
@@ -102,7 +105,7 @@ pub enum Fault {
         value: String,
     },
     /// The numbers do not fit into memory.
-    #[error("line {line}: the numbers up to here fill the memory; read a part of the file")]
+    #[error("line {line}: the numbers up to this line fill the memory. Read a part of the file")]
     Memory {
         /// The line.
         line: usize,
@@ -241,8 +244,8 @@ impl Row<'_> {
         let written = self.cells.get(column).map(|cell| text(cell));
         let found = written.as_deref().and_then(date);
         let kind = match (found, clock.last, clock.first_date) {
-            (Some(_), Some(_), None) => Some("is a date, and the times above it are numbers"),
-            (None, _, Some(_)) => Some("is no date, as the times above it are"),
+            (Some(_), Some(_), None) => Some("is a date, but the times above are numbers"),
+            (None, _, Some(_)) => Some("is not a date, but the times above are dates"),
             _ => None,
         };
         if let Some(reason) = kind {
@@ -307,7 +310,7 @@ impl Row<'_> {
                 } else if !marks.is_decimal && marks.unclear.is_none() {
                     let grouped = text(cell).trim().replace(',', "");
                     marks.unclear = Some(fault(format!(
-                        "may be {value} or {grouped}, and no other cell tells which: write a \
+                        "may be {value} or {grouped}, and no other cell shows which: write a \
                          decimal point, or no comma"
                     )));
                 }
@@ -358,7 +361,8 @@ impl Marks {
 
 fn two_marks(mark: &str, other: usize) -> String {
     format!(
-        "has a decimal {mark}, and line {other} has the other: write a decimal point in all cells"
+        "has a decimal {mark}, but line {other} has the other mark: write a decimal point in all \
+         cells"
     )
 }
 

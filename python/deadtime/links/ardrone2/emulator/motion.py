@@ -74,7 +74,9 @@ class LinearMotion(Motion):
     def __init__(self, plant: Plant) -> None:
         space = plant.state_space()
         if space.D != 0.0:
-            raise ValueError(f"{plant} has direct feedthrough: give a strictly proper plant")
+            raise ValueError(
+                f"{plant} has direct feedthrough: give a plant with a lag or an integrator"
+            )
         n = len(space.B)
         self._plant = plant
         flow = np.zeros((n + 1, n + 1))

@@ -35,13 +35,13 @@ class EmulatorOptions:
     Parameters
     ----------
     plant : {"kit", "paper", "real", "thrust"}
-        How height answers the commanded climb.
+        Model of the response of the height to the commanded climb.
     delay : float, optional
         Transport delay, s. Default: the plant's.
 
         That of motion commands, up to 100 s.
     jitter : float
-        Motion commands take up to this much longer, s.
+        Largest additional delay of motion commands, s.
 
         Uniformly distributed, up to 100 s; none overtakes another.
     downlink : float
@@ -49,34 +49,34 @@ class EmulatorOptions:
 
         Up to 20 s.
     noise : float
-        Noise of the height, m.
+        Standard deviation of the noise of the height, m.
 
-        Its standard deviation, up to 10 m; the measured climb has ten times as much, in m/s.
+        Up to 10 m; the measured climb has ten times as much, in m/s.
     battery : float
-        Charge, percent.
+        Charge of the battery at the start, percent.
 
         At the start.
     seed : int
         Seed of noise and jitter.
     host : str
-        Address to listen on; others than 127.* can be reached from afar.
+        Address on which the emulator listens. Other computers can reach all addresses except 127.*.
     clients : tuple of str
         Addresses of the accepted hosts; without any, every host that can reach the emulator.
         Required where other machines can reach it: a forged address then cannot make it send
         navdata to other hosts.
     navdata_port, command_port, control_port : int
-        This port; 0: a free one.
+        Number of this port. With 0, a free port is used.
     ftp_port : int, optional
-        Port that tells that there are no files; ps_drone needs 21.
+        Port of an FTP server that has no files. ps_drone needs port 21.
 
         None by default.
     video_port : int, optional
-        This port; 0: a free one.
+        Number of this port. With 0, a free port is used.
 
         It reports that there is no video. None by default.
     worst_case : bool
-        Do the worst that the vehicle may do: hold the last motion until the link is lost, take off
-        whenever the bit is set; or hover 0.25 s after the last motion.
+        Behave as badly as a vehicle may: hold the last motion until the link is lost, and take off
+        whenever the bit is set. Or hover 0.25 s after the last motion.
 
         The bit is that of the take-off. The vehicle that is forgiving takes off when it becomes
         set.
@@ -93,7 +93,7 @@ class EmulatorOptions:
     0.36
     >>> EmulatorOptions(plant="kite")
     Traceback (most recent call last):
-    ValueError: plant='kite' is none of kit, paper, real, thrust
+    ValueError: plant='kite': give one of kit, paper, real, thrust
     """
 
     plant: PlantName = "kit"
@@ -114,17 +114,19 @@ class EmulatorOptions:
 
     def __post_init__(self) -> None:
         if self.plant not in DELAYS:
-            raise ValueError(f"plant={self.plant!r} is none of {', '.join(get_args(PlantName))}")
+            raise ValueError(f"plant={self.plant!r}: give one of {', '.join(get_args(PlantName))}")
         check_bounds(self)
         for client in self.clients:
             try:
                 ip_address(client)
             except ValueError:
-                raise ValueError(f"clients: {client!r} is not an IP address") from None
+                raise ValueError(
+                    f"clients contains {client!r}, which is not an IP address"
+                ) from None
         if not self.only_here and not self.clients:
             raise ValueError(
-                f"host={self.host!r} can be reached by other computers: give the IP addresses "
-                "of the clients that the emulator answers"
+                f"other computers can reach host={self.host!r}: give as clients the IP "
+                "addresses that the emulator answers"
             )
 
     @property

@@ -108,8 +108,8 @@ class Emulator:
             await self.close()
             raise LinkError(
                 f"the emulator cannot listen on {self.host}, {self._opening} "
-                f"{getattr(self, self._opening)}: {error.strerror}; choose another, or 0 for a "
-                "free one (a port below 1024 needs a privilege)"
+                f"{getattr(self, self._opening)}: {error.strerror}. Give another port, or 0 for "
+                "any free port. Ports below 1024 need administrator rights"
             ) from error
         return self
 

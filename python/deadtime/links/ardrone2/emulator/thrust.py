@@ -80,7 +80,7 @@ class Thruster:
         if not self.slowest < self.hover_speed < self.fastest:
             raise ValueError(
                 f"hover_speed={self.hover_speed} is not between slowest={self.slowest} and "
-                f"fastest={self.fastest}: such a vehicle cannot hover"
+                f"fastest={self.fastest}, so such a vehicle cannot hover"
             )
 
     @property

@@ -176,7 +176,7 @@ impl<S: Scalar> LinearLoop<S> {
         for (name, found, wanted) in lengths {
             refuse_if!(
                 found != wanted,
-                "{name} has {found} elements, {wanted} are needed for {n} states"
+                "{name} has {found} elements, but {wanted} are needed for {n} states"
             );
         }
         finite("A", &equations.a)?;
@@ -199,7 +199,7 @@ impl<S: Scalar> LinearLoop<S> {
             && !(ts.is_finite() && ts.value() > 0.0)
         {
             refuse!(
-                "sample_time={}: give a positive number of seconds, or none for continuous time",
+                "sample_time={}: give a time in s above zero, or none for continuous time",
                 ts.value()
             );
         }
@@ -210,7 +210,7 @@ impl<S: Scalar> LinearLoop<S> {
             && (limit.value().is_nan() || limit.value() <= 0.0)
         {
             refuse!(
-                "limit={}: give a positive bound of the command, or none for no limit",
+                "limit={}: give a limit of the command above zero, or none for no limit",
                 limit.value()
             );
         }
@@ -274,7 +274,7 @@ impl<S: Scalar> LinearLoop<S> {
         );
         refuse_if!(
             lengths != (n * n, n, n),
-            "the update of a sample has {lengths:?} elements, {:?} are needed for {n} states",
+            "the update of a sample has {lengths:?} elements, but {:?} are needed for {n} states",
             (n * n, n, n)
         );
         refuse_if!(

@@ -28,7 +28,7 @@ impl Reference {
         finite("reference time", &times)?;
         if let Some(pair) = times.windows(2).find(|pair| pair[1] <= pair[0]) {
             refuse!(
-                "reference time {} follows {}: sort the times and drop repeated ones",
+                "reference time {} follows {}: give increasing times",
                 pair[1],
                 pair[0]
             );

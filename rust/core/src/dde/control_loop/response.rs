@@ -166,10 +166,10 @@ fn increasing(name: &str, times: &[f64]) -> Result<(), Error> {
     {
         None => Ok(()),
         Some((_, (_, time))) if !time.is_finite() => {
-            refuse!("{name} holds {time}: give finite times")
+            refuse!("{name} contains {time}: give finite times")
         }
         Some((at, (before, time))) => refuse!(
-            "{name}[{at}]={time:?} does not come after {name}[{}]={before:?}: give increasing \
+            "{name}[{at}]={time:?} is not later than {name}[{}]={before:?}: give increasing \
              times",
             at - 1
         ),
@@ -183,8 +183,8 @@ mod tests {
     #[test]
     fn times_that_do_not_increase_are_named() {
         let message = |times: &[f64]| increasing("time", times).unwrap_err().to_string();
-        assert!(message(&[0.0, 1.0, 1.0]).starts_with("time[2]=1.0 does not come after time[1]"));
-        assert!(message(&[f64::NAN]).contains("holds NaN"));
+        assert!(message(&[0.0, 1.0, 1.0]).starts_with("time[2]=1.0 is not later than time[1]"));
+        assert!(message(&[f64::NAN]).contains("contains NaN"));
         assert!(message(&[0.0, f64::INFINITY]).contains("finite"));
         assert!(increasing("time", &[]).is_ok());
     }

@@ -53,7 +53,7 @@ impl<'a, S: Scalar> Row<'a, S> {
                 })
             }
             _ => refuse!(
-                "a row of {} numbers: a loop with {n} states has {}",
+                "a row has {} numbers, but a loop with {n} states needs {}",
                 row.len(),
                 width(n)
             ),

@@ -41,7 +41,7 @@ impl<S: Scalar> LinearLoop<S> {
             if let Some(&first) = times.first()
                 && first < 0.0
             {
-                refuse!("time {first} lies before the start of the run: leave it out");
+                refuse!("time {first} is before the start of the run: leave it out");
             }
             let is_sorted = times
                 .windows(2)
@@ -72,7 +72,7 @@ impl<S: Scalar> LinearLoop<S> {
         let n = self.equations().states();
         refuse_if!(
             start.state.len() != n,
-            "the initial state has {} elements, the loop has {n} states",
+            "the initial state has {} elements, but the loop has {n} states",
             start.state.len()
         );
         finite("initial state", &start.state)?;
@@ -81,15 +81,15 @@ impl<S: Scalar> LinearLoop<S> {
         match self.sample_time() {
             Some(ts) if !(0.0..ts.value()).contains(&start.sample_phase) => {
                 refuse!(
-                    "sample_phase={}: the first sample lies in [0, {}) s after the start",
+                    "sample_phase={}: give a time from 0 to below {} s",
                     start.sample_phase,
                     ts.value()
                 )
             }
             None if !start.command_history.is_empty() || start.sample_phase != 0.0 => {
                 Err(Error::argument(
-                    "command_history and sample_phase belong to sampled loops: give the loop a \
-                     sample_time or leave them out",
+                    "command_history and sample_phase apply only to sampled loops: give the loop \
+                     a sample_time or leave them out",
                 ))
             }
             _ => Ok(()),

@@ -74,7 +74,7 @@ impl Delayed {
                 }
                 let index = history.locate(time);
                 let Some(piece) = index.and_then(|index| history.piece(index)) else {
-                    refuse!("the history is empty: give one");
+                    refuse!("the history is empty: give at least one entry");
                 };
                 let mut beyond = first + 1;
                 while beyond < n && inwards(place.t, beyond) - delay < piece.end {

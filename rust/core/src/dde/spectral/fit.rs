@@ -222,8 +222,8 @@ fn divide(
                         limit: MOST as u64,
                         unit: "polynomial pieces",
                         advice: format!(
-                            "it is too rough near t = {middle}; give history_breaks at its kinks \
-                             and jumps, smooth it, or raise rtol and atol"
+                            "it is too rough near t = {middle}. Give the times of its kinks and \
+                             jumps in history_breaks, smooth it, or raise rtol and atol"
                         ),
                     });
                 }

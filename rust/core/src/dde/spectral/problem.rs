@@ -173,15 +173,15 @@ impl Problem {
         let refuse = |message: String| Err(Error::argument(message));
         if !(self.start.is_finite() && self.end.is_finite() && self.end > self.start) {
             return refuse(format!(
-                "t_span=({}, {}): give two finite times, the later one second; an equation with \
+                "t_span=({}, {}): give two finite times, the later one second. An equation with \
                  delays has no solution backwards in time",
                 self.start, self.end
             ));
         }
         if let Some(delay) = self.delays.iter().find(|delay| **delay < 0.0) {
             return refuse(format!(
-                "the delay {delay} is negative: the equation is of advanced type, its future \
-                 would decide its present; give delays above zero"
+                "the delay {delay} is negative, so the equation is advanced, and its future would \
+                 determine its present. Give delays above zero"
             ));
         }
         if let Some(delay) = self
@@ -190,13 +190,13 @@ impl Problem {
             .find(|delay| **delay == 0.0 || delay.is_nan())
         {
             return refuse(format!(
-                "the delay {delay} is not above zero: write y itself where the delay is 0"
+                "the delay {delay} is not above zero: in fun, use y itself for a delay of 0"
             ));
         }
         let resolution = RESOLUTION * self.start.abs().max(self.end.abs());
         if let Some(delay) = self.delays.iter().find(|delay| **delay <= resolution) {
             return refuse(format!(
-                "the delay {delay} is lost in the rounding errors of the times of t_span: leave \
+                "the delay {delay} is smaller than the rounding errors of times in t_span: leave \
                  it out, or shift and scale time"
             ));
         }
@@ -207,8 +207,8 @@ impl Problem {
         let needed = self.start - self.memory() * (1.0 - HISTORY_ROUNDING);
         if let Some(first) = first.filter(|first| *first > needed) {
             return refuse(format!(
-                "the history starts at {first}: give it from {} on, the start minus the largest \
-                 delay",
+                "the history starts at {first}: give the history from {} on, the start minus the \
+                 largest delay",
                 self.start - self.memory()
             ));
         }
@@ -229,7 +229,7 @@ impl Problem {
         }
         if self.atol.len() != 1 && self.atol.len() != self.dim() {
             return refuse(format!(
-                "atol has {} entries for {} components: give one, or one for each component",
+                "atol has {} entries for {} components: give one number, or one for each component",
                 self.atol.len(),
                 self.dim()
             ));
@@ -245,7 +245,7 @@ impl Problem {
             && !(times.is_sorted() && times.iter().all(|time| within(*time)))
         {
             return refuse(format!(
-                "t_eval must ascend and lie within t_span=({}, {})",
+                "t_eval must contain increasing times within t_span=({}, {})",
                 self.start, self.end
             ));
         }

@@ -53,16 +53,16 @@ pub fn series(
     let kind = name.split(' ').next().unwrap_or(name);
     refuse_if!(
         length / gap > MOST_SAMPLES,
-        "max_step={gap}: that is more than {MOST_SAMPLES} samples of {name} from {} to {} s; give a \
-         larger one, and name what is shorter in {kind}_breaks",
+        "max_step={gap} makes more than {MOST_SAMPLES} samples of {name} from {} to {} s. Give a \
+         larger max_step, and give the times of shorter changes in {kind}_breaks",
         span.0,
         span.1
     );
     let tolerance = |_: usize, size: f64| ENDED * size;
     let refused = |error| match error {
         Error::TooMuch { limit, unit, .. } => Error::Argument(format!(
-            "{name} needs more than {limit} {unit}: it is too rough or too fast for one run of \
-             {length} s; shorten the run, or give samples"
+            "{name} needs more than {limit} {unit}, because it is too rough or too fast for one \
+             run of {length} s. Give a shorter run, or give samples"
         )),
         other => other,
     };
@@ -81,7 +81,7 @@ pub fn series(
             Some(time) => known.push(time),
             None => refuse_if!(
                 is_kink(place, reach, &found.sizes, &mut function)?,
-                "{name} is not smooth at t = {place:.10} s: name the time in {kind}_breaks, or \
+                "{name} is not smooth at t = {place:.10} s: give this time in {kind}_breaks, or \
                  give samples"
             ),
         }

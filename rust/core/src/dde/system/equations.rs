@@ -76,19 +76,19 @@ impl Signal {
         let count = edges.len().saturating_sub(1);
         refuse_if!(
             count == 0 || terms == 0 || terms > TERMS,
-            "{} edges and {terms} coefficients make no signal: give at least two edges and 1 \
-             to {} coefficients",
+            "{} edges and {terms} coefficients are not a signal: give at least two edges and 1 to \
+             {} coefficients",
             edges.len(),
             TERMS
         );
         refuse_if!(
             series.len() != count * width * terms,
-            "{} coefficients for {count} pieces of {width} columns with {terms} each",
+            "{} coefficients do not fit {count} pieces of {width} columns with {terms} each",
             series.len()
         );
         if let Some(pair) = edges.windows(2).find(|pair| pair[1] <= pair[0]) {
             refuse!(
-                "the time {} of a signal does not come after {}: give increasing times",
+                "the time {} of a signal is not later than {}: give increasing times",
                 pair[1],
                 pair[0]
             );

@@ -161,8 +161,8 @@ impl Jumps {
                 what: "the response of the system",
                 limit: MOST_KEPT as u64,
                 unit: "breaking points within the longest delay",
-                advice: "shorten the time simulated; breaks of a neutral system become small \
-                     sooner with smaller delayed derivatives"
+                advice: "simulate a shorter time. With smaller delayed derivatives, the breaks of \
+                     a neutral system become small sooner"
                     .to_owned(),
             });
         }

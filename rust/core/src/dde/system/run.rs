@@ -239,8 +239,8 @@ fn check_growth(x: &[f64], t: f64) -> Result<(), Error> {
         return Ok(());
     }
     refuse!(
-        "the response exceeds {DIVERGED:e} at t = {t} s after the start: the system is unstable, \
-         end the simulation earlier"
+        "the response exceeds {DIVERGED:e} at t = {t} s after the start, so the system is \
+         unstable: end the run earlier"
     )
 }
 
@@ -249,6 +249,6 @@ fn endless() -> Error {
         what: "the response of the system",
         limit: MOST_ELEMENTS,
         unit: "elements of time",
-        advice: "shorten the time simulated; set delays close to zero to exactly zero".to_owned(),
+        advice: "simulate a shorter time, and set delays close to zero to exactly zero".to_owned(),
     }
 }

@@ -30,7 +30,7 @@ impl LinearSystem {
         }
         refuse_if!(
             equations.derivative.iter().any(|term| term.delay == 0.0),
-            "N has a matrix with delay 0: take it to the other side, into E"
+            "N has a matrix with delay 0: subtract this matrix from E instead"
         );
         Ok(Self { equations })
     }
@@ -52,7 +52,7 @@ impl LinearSystem {
         for (name, found, wanted) in widths {
             refuse_if!(
                 found != wanted,
-                "{name} has {found} components, not {wanted}"
+                "{name} has {found} components instead of {wanted}"
             );
         }
         refuse_if!(
@@ -63,14 +63,14 @@ impl LinearSystem {
         );
         finite("the initial state", &past.state)?;
         if let Some(time) = times.iter().find(|time| !time.is_finite()) {
-            refuse!("the times hold {time}: give finite ones");
+            refuse!("the times contain {time}: give finite times");
         }
         if let Some(first) = times.first().filter(|first| **first < 0.0) {
-            refuse!("time {first} lies before the start of the run: leave it out");
+            refuse!("time {first} is before the start of the run: leave it out");
         }
         if let Some(pair) = times.windows(2).find(|pair| pair[1] <= pair[0]) {
             refuse!(
-                "time {} does not come after {}: give increasing times",
+                "time {} is not later than {}: give increasing times",
                 pair[1],
                 pair[0]
             );

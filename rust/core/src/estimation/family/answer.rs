@@ -125,7 +125,7 @@ impl Family {
 pub(super) fn check_level(level: f64) -> Result<(), Error> {
     refuse_if!(
         !(level > 0.0 && level < 1.0),
-        "level {level}: give one between 0 and 1"
+        "the level is {level}: give a level between 0 and 1"
     );
     Ok(())
 }

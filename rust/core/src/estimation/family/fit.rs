@@ -87,7 +87,8 @@ fn of_readings(records: &[Record], question: &Question, task: &Task) -> Result<F
     if let Some(delay) = question.largest_delay {
         refuse_if!(
             !(delay > 0.0 && delay <= shortest),
-            "largest delay {delay} s: give one above 0 and below the length of the record, {shortest} s"
+            "the largest delay is {delay} s: give a delay above 0 and below the length of the \
+             recording, {shortest} s"
         );
     }
     check_level(question.level)?;
@@ -112,7 +113,10 @@ fn of_readings(records: &[Record], question: &Question, task: &Task) -> Result<F
 
 /// What is known of the plant at the first row of each record.
 fn starts_of(records: &[Record], question: &Question) -> Result<Vec<Start>, Error> {
-    refuse_if!(records.is_empty(), "0 records: give at least one");
+    refuse_if!(
+        records.is_empty(),
+        "no recording was given: give at least one"
+    );
     let start = |record: &Record| match question.at_rest {
         Some(true) => Start::Rest,
         None if record.begins_at_rest() => Start::Held,
@@ -131,8 +135,8 @@ fn check_rows(rows: &Rows, largest: f64) -> Result<(), Error> {
     for part in &rows.parts {
         refuse_if!(
             part.used.len() < FEWEST_ROWS,
-            "{} rows count, those after the largest delay of {largest} s whose output is known; a fit \
-             needs {FEWEST_ROWS}: give more rows, or a smaller largest delay",
+            "only {} rows with a known output are later than the largest delay of {largest} s, \
+             but a fit needs {FEWEST_ROWS}: give more rows, or a smaller largest delay",
             part.used.len()
         );
     }

@@ -42,7 +42,7 @@ impl Record {
         let sent = self.sent();
         refuse_if!(
             self.command.len() != sent.len() || self.output.len() != count || sent.is_empty(),
-            "{count} times, {} commands and {} outputs: give one of each for every row",
+            "{count} times, {} commands and {} outputs are given: give one of each for every row",
             self.command.len(),
             self.output.len()
         );
@@ -50,24 +50,25 @@ impl Record {
         check_times(sent)?;
         refuse_if!(
             !(self.hold >= 0.0 && self.hold.is_finite()),
-            "commands hold for {} s: give 0 or more",
+            "commands are held for {} s: give 0 or more",
             self.hold
         );
         if let Some(at) = (0..sent.len()).find(|at| !self.command[*at].is_finite()) {
             refuse!(
-                "command {} in row {at}: commands must be finite",
+                "the command in row {at} is {}, but commands must be finite",
                 self.command[at]
             );
         }
         if let Some(at) = (0..count).find(|at| self.output[*at].is_infinite()) {
             refuse!(
-                "output {} in row {at}: outputs must be finite, or NaN where they are missing",
+                "the output in row {at} is {}, but outputs must be finite, or NaN where they are \
+                 missing",
                 self.output[at]
             );
         }
         refuse_if!(
             self.earlier >= count,
-            "{} earlier rows of {count}: leave rows to fit",
+            "{} of {count} rows are earlier rows: leave some rows to fit",
             self.earlier
         );
         Ok(self)
@@ -137,13 +138,13 @@ impl Record {
 fn check_times(time: &[f64]) -> Result<(), Error> {
     if let Some(at) = (1..time.len()).find(|at| time[*at] <= time[at - 1]) {
         refuse!(
-            "time {} s in row {at} after {} s: times must increase",
+            "time {} s in row {at} follows {} s, but times must increase",
             time[at],
             time[at - 1]
         );
     }
     if let Some(at) = (0..time.len()).find(|at| !time[*at].is_finite()) {
-        refuse!("time {} in row {at}: times must be finite", time[at]);
+        refuse!("the time in row {at} is {}: give finite times", time[at]);
     }
     Ok(())
 }

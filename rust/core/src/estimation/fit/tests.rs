@@ -246,8 +246,11 @@ fn numbers_out_of_range_are_refused_by_value() {
             point(0.2, 0.2, vec![Noise::QUIET; 2]),
             "noise of 2 recordings",
         ),
-        (point(0.2, 0.2, noise(1.0, -2.0)), "noise of deviation -2"),
-        (point(0.2, 0.2, noise(-3.0, 2.0)), "time constant -3"),
+        (
+            point(0.2, 0.2, noise(1.0, -2.0)),
+            "standard deviation of -2",
+        ),
+        (point(0.2, 0.2, noise(-3.0, 2.0)), "time constant of -3"),
     ] {
         let point = Point { gain: 1.0, ..point };
         for found in [

@@ -305,8 +305,8 @@ impl FlightFit {
         let is_gone = !lags.is_empty() && lags.iter().all(|lag| *lag == 0.0);
         if point.zero != 0.0 && is_gone && plant.den.len() <= 2 {
             return Err(Error::NotIdentifiable(
-                "the lags come out at zero, where a zero has no effect on the rows: leave 'zero' and \
-                 the lags out of free=, or give the plant a further lag"
+                "the lags are estimated as zero, where a zero has no effect on the rows: leave \
+                 'zero' and the lags out of free=, or give the plant a further lag"
                     .into(),
             ));
         }
@@ -345,7 +345,7 @@ impl FlightFit {
     pub fn trim_and_white(&self, run: usize, task: &Task) -> Result<(f64, f64), Error> {
         let (Some(part), Some(rows)) = (self.parts(task)?.get(run), self.runs.get(run)) else {
             refuse!(
-                "recording {run} of {}: give the number of one",
+                "recording number {run} does not exist: give a number below {}",
                 self.runs.len()
             )
         };

@@ -95,7 +95,7 @@ impl FlightProfile {
         let is_known = covariance.iter().all(|entry| entry.is_finite());
         if !is_known || !squares.iter().all(|square| *square > 0.0) {
             return Err(Error::NotIdentifiable(
-                "the recordings do not distinguish these numbers".into(),
+                "the recordings do not determine these parameters".into(),
             ));
         }
         let unseen = unseen_air(&fit, &common, &weights, &squares, task)?;
@@ -239,7 +239,7 @@ impl FlightProfile {
     pub fn widened(&self, factors: &[f64]) -> Result<Self, Error> {
         refuse_if!(
             factors.len() != self.known.len(),
-            "{} factors for {} quantities: give one for each",
+            "{} factors are given for {} quantities: give one factor for each",
             factors.len(),
             self.known.len()
         );
@@ -266,7 +266,7 @@ impl FlightProfile {
         match known.find(|known| known.quantity == quantity) {
             Some(known) => Ok(known),
             None => {
-                refuse!("{quantity:?} was not fitted: ask for one of the quantities of the profile")
+                refuse!("{quantity:?} was not fitted: give a quantity that the profile contains")
             }
         }
     }
@@ -403,7 +403,7 @@ impl FlightProfile {
         let found = numbers.and_then(|own| Some((*own.values.get(place)?, own.deviation(place))));
         match found {
             Some(found) => Ok(found),
-            None => refuse!("number {place} was not fitted: ask for one of those that were"),
+            None => refuse!("parameter number {place} was not fitted: give one that was fitted"),
         }
     }
 

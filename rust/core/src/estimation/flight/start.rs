@@ -123,7 +123,7 @@ pub fn least_squares(
     task: &Task,
 ) -> Result<FlightFit, Error> {
     let Some(row_time) = runs.first().map(|run| run.row_time) else {
-        refuse!("no recording: give at least one")
+        refuse!("no recording was given: give at least one")
     };
     // At a zero of none its effect is that of a shorter delay: to first order, they cannot be told
     // apart.
@@ -206,16 +206,16 @@ fn nothing_told(
         let model = without.model(vec![run.rows.clone()], false)?;
         if !minima(&without, run, &model, first, task)?.is_empty() {
             return Ok(Error::NotIdentifiable(
-                "delay and zero cannot be distinguished: with a zero for every lag the output jumps \
-                 with the command, and a later jump looks like a smaller one; leave delay or zero \
-                 out of free=, or give the plant a further lag"
+                "delay and zero cannot be distinguished. With a zero for every lag the output \
+                 jumps with the command, and a later jump looks like a smaller one. Leave delay \
+                 or zero out of free=, or give the plant a further lag"
                     .into(),
             ));
         }
     }
     Ok(Error::NotIdentifiable(
-        "the output does not depend on the command within the window: widen it, or check that the \
-         columns belong together"
+        "within the window, the output does not depend on the command: choose a longer window, or \
+         check the columns"
             .into(),
     ))
 }

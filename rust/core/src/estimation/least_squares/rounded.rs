@@ -122,7 +122,7 @@ impl Rounded<'_> {
         }
         match best {
             Some(best) => Ok(best),
-            None => refuse!("there is no point to start from"),
+            None => refuse!("there is no starting point for the search"),
         }
     }
 
@@ -303,7 +303,7 @@ impl Rounded<'_> {
         }
         let Some(inverse) = inverse_of_positive(&whole, n, 0.0) else {
             return Err(Error::NotIdentifiable(
-                "the rounded rows do not distinguish these numbers".into(),
+                "the rounded rows do not determine these parameters".into(),
             ));
         };
         let entry = |place: usize| 2.0 * inverse[(place / count) * n + place % count];

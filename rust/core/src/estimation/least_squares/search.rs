@@ -38,7 +38,7 @@ pub fn solve(joint: &Joint<'_>, task: &Task) -> Result<Minimum, Error> {
         }
     }
     let Some(best) = best else {
-        refuse!("there is no point to start from")
+        refuse!("there is no starting point for the search")
     };
     minimise(joint, &best.point, &all, SEARCH.to_rounding, task)
 }

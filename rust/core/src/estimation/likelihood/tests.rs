@@ -356,7 +356,7 @@ fn fewer_rows_than_unknowns_are_refused() {
         Wanted::Slopes,
         &Task::new(),
     );
-    assert!(found.is_err_and(|error| error.to_string().starts_with("5 rows for 5 unknowns")));
+    assert!(found.is_err_and(|error| error.to_string().starts_with("5 rows are too few")));
 }
 
 #[test]

@@ -16,7 +16,8 @@ pub fn online(settings: Settings) -> Result<Box<dyn Online>, Error> {
         ($($states:literal)*) => {
             match settings.states() {
                 $(..=$states => Ok(Box::new(Bank::<$states>::new(settings)?)),)*
-                n => refuse!("{n} states of plant, noise, gain and level: the bank takes up to 9"),
+                n => refuse!("plant, noise, gain and level have {n} states, but the filters can \
+                    use at most 9"),
             }
         };
     }

@@ -43,7 +43,7 @@ impl History {
     pub(super) fn push(&mut self, time: f64, value: f64) -> Result<(), Error> {
         refuse_if!(
             !time.is_finite() || !value.is_finite(),
-            "the command {value} at {time} s: give finite numbers"
+            "the command at {time} s is {value}: give finite numbers"
         );
         if let Some((last, _)) = self.sent.back() {
             refuse_if!(

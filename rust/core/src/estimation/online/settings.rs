@@ -67,14 +67,17 @@ impl Settings {
 
     pub(super) fn check(&self) -> Result<(), Error> {
         let (count, delays) = (self.delays.len(), &self.delays);
-        refuse_if!(count < 3, "{count} delays: give three or more");
+        refuse_if!(count < 3, "{count} delays were given: give three or more");
         check_times("delay", delays)?;
         refuse_if!(
             delays[0] < 0.0,
-            "the delay {} s: give delays of at least zero",
+            "a delay is {} s: give delays of zero or more",
             delays[0]
         );
-        refuse_if!(self.layers.is_empty(), "no set of lags: give one or more");
+        refuse_if!(
+            self.layers.is_empty(),
+            "no set of lags was given: give one or more"
+        );
         let states = self.layers[0]
             .lags
             .iter()
@@ -83,7 +86,7 @@ impl Settings {
         for layer in &self.layers {
             refuse_if!(
                 layer.log_prior.len() != count,
-                "{count} delays and {} prior weights: give equally many",
+                "{count} delays and {} prior weights are given: give one weight for each delay",
                 layer.log_prior.len()
             );
             if let Some(lag) = layer
@@ -91,11 +94,11 @@ impl Settings {
                 .iter()
                 .find(|lag| !(lag.is_finite() && **lag >= 0.0))
             {
-                refuse!("the lag {lag} s: give finite lags of at least zero");
+                refuse!("a lag is {lag} s: give finite lags of zero or more");
             }
             refuse_if!(
                 layer.lags.iter().filter(|lag| **lag != 0.0).count() != states,
-                "sets of lags with and without a lag of zero: give the same lags in all"
+                "some sets of lags have a lag of zero, others not: give the same lags in all"
             );
             let best = layer
                 .log_prior
@@ -104,7 +107,7 @@ impl Settings {
                 .fold(f64::NEG_INFINITY, f64::max);
             refuse_if!(
                 best == f64::INFINITY || best.is_nan(),
-                "a prior weight is {best}"
+                "a prior weight is {best}: give the logarithm of a finite weight"
             );
         }
         let tops = self
@@ -126,7 +129,7 @@ impl Settings {
         for (what, value) in above {
             refuse_if!(
                 value.is_nan() || value <= 0.0,
-                "{what} of {value}: give one above zero"
+                "{what} of {value}: give a number above zero"
             );
         }
         for (what, value) in [
@@ -136,19 +139,19 @@ impl Settings {
         ] {
             refuse_if!(
                 !(value.is_finite() && value >= 0.0),
-                "{what} of {value}: give a finite one of at least zero"
+                "{what} of {value}: give a finite number, zero or more"
             );
         }
         refuse_if!(
             !(self.white.is_finite() && self.gain.0.is_finite() && self.gain.1.is_finite()),
-            "white noise of {} and a gain of {} ± {}: give finite numbers",
+            "the white noise is {}, and the gain {} ± {}: give finite numbers",
             self.white,
             self.gain.0,
             self.gain.1
         );
         refuse_if!(
             !(self.level > 0.0 && self.level < 1.0),
-            "a level of {}: give one between zero and one",
+            "the level is {}: give a level between 0 and 1",
             self.level
         );
         Ok(())

@@ -83,8 +83,7 @@ pub(crate) fn closed_sides(
     }
     refuse_if!(
         !(re.0.is_finite() && re.1.is_finite()),
-        "no bound for the roots within the open side was found in double precision: close \
-         the region"
+        "double precision cannot bound the roots on the open side: close the region"
     );
     Ok(Region { re, im })
 }
@@ -109,9 +108,11 @@ pub(crate) fn close(
 
 pub(crate) fn endless(h: &QuasiPolynomial, re: (f64, f64)) -> Error {
     let reason = match h.kind() {
-        Kind::Polynomial => "its coefficients span more than double precision holds".to_owned(),
+        Kind::Polynomial => {
+            "the sizes of its coefficients differ too much for double precision".to_owned()
+        }
         Kind::Retarded if re.0 >= 0.0 => {
-            "its coefficients span more than double precision holds".to_owned()
+            "the sizes of its coefficients differ too much for double precision".to_owned()
         }
         Kind::Retarded => format!(
             "the real part is open to the left or reaches far left ({})",
@@ -126,9 +127,8 @@ pub(crate) fn endless(h: &QuasiPolynomial, re: (f64, f64)) -> Error {
         Kind::Advanced => "the equation is advanced".to_owned(),
     };
     Error::argument(format!(
-        "the region re=({}, {}) with an open imaginary part holds infinitely many roots, or cannot \
-         be shown to hold finitely many: {reason}; give both ends of im, or move re, or ask \
-         rightmost(n) for the n rightmost ones",
+        "the region re=({}, {}) with an open imaginary part may contain infinitely many roots: \
+         {reason}. Give both ends of im, or move re, or ask rightmost(n) for the n rightmost roots",
         re.0, re.1
     ))
 }

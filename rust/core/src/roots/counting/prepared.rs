@@ -40,7 +40,7 @@ impl Prepared {
         });
         refuse_if!(
             largest == 0.0,
-            "the zero function: every s is a root, there is nothing to count"
+            "the function is zero everywhere, so its roots cannot be counted"
         );
         // Exponents and powers of two are exact.
         let shift = (-libm::ilogb(largest)).max((LOWEST_EXPONENT - libm::ilogb(smallest)).min(0));

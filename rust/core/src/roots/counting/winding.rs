@@ -158,7 +158,7 @@ impl<'a> Walker<'a> {
                 what: "the search for roots",
                 limit: self.limit,
                 unit: "evaluations",
-                advice: "take a smaller region, or keep its edges clear of chains of roots".into(),
+                advice: "give a smaller region, or edges that are far from chains of roots".into(),
             });
         }
         Ok(())
@@ -459,7 +459,7 @@ pub(crate) fn newton_step(jet: &Jet) -> Complex64 {
 
 pub(crate) fn overflow(s: Complex64) -> Error {
     Error::argument(format!(
-        "the function cannot be evaluated at {s:e}: a power of s leaves the range of double \
-         precision; choose another unit of time or another region"
+        "the function cannot be evaluated at {s:e}, because a power of s exceeds double \
+         precision: choose another unit of time or another region"
     ))
 }

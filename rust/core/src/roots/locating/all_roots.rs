@@ -114,7 +114,7 @@ pub(crate) fn locate(walker: &mut impl Seek, cell: Cell) -> Result<Vec<Disc>, Er
             what: "the list of all roots",
             limit: MAX_ROOTS,
             unit: "roots",
-            advice: "take a smaller region".into(),
+            advice: "give a smaller region".into(),
         });
     }
     let mut search = if cell.count > MANY {

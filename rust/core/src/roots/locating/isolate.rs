@@ -416,8 +416,8 @@ impl<'w, W: Seek> Search<'w, W> {
             counted,
             found: found.map(|disc| (disc.center, disc.multiplicity)).collect(),
             advice: format!(
-                "near {:e}{:+e}i double precision does not separate the roots; another unit of \
-                 time or a less expanded form of the equation may help",
+                "near {:e}{:+e}i, double precision cannot separate the roots. Try another unit of \
+                 time, or an equation that is expanded less",
                 0.5 * (cell.re.0 + cell.re.1),
                 cell.im.1
             ),

@@ -106,9 +106,9 @@ pub(crate) fn between_lines(sigma: f64, chain: f64) -> Error {
         limit: EVALUATIONS_PER_LINE,
         unit: "evaluations on a line",
         advice: format!(
-            "no root lies right of Re s = {sigma:.6}, but the roots between that line and the chains of \
-             roots at Re s = {chain:.6} could not be counted; use count with both ends of im, or \
-             give delays that are almost equal one value"
+            "no root lies right of Re s = {sigma:.6}. The roots between this line and the chains \
+             at Re s = {chain:.6} could not be counted. Use count with both ends of im, or make \
+             almost equal delays equal"
         ),
     }
 }
@@ -359,7 +359,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
             what: "the search for a line right of which the rightmost roots lie",
             limit: MAX_LINES as u64,
             unit: "lines",
-            advice: "ask for fewer roots, or for those in a region".into(),
+            advice: "give a smaller number of roots, or a region".into(),
         }))
     }
 
@@ -518,8 +518,9 @@ impl<'a, S: Spectrum> Lines<'a, S> {
                     };
                     refuse_if!(
                         distance > MOST_ASIDE * self.first_step,
-                        "the roots right of Re s = {sigma} cannot be counted: the numbers of this \
-                         equation differ too much in size for double precision"
+                        "the roots right of Re s = {sigma} cannot be counted, because the sizes \
+                         of the coefficients differ too much for double precision: choose another \
+                         unit of time"
                     );
                     if attempt >= MAX_ASIDE {
                         return Err(error);

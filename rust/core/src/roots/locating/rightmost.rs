@@ -45,12 +45,12 @@ const MAX_WANTED: usize = 10_000;
 pub fn rightmost(h: &QuasiPolynomial, n: usize, task: &Task) -> Result<RootSet, Error> {
     refuse_if!(
         n == 0 || n > MAX_WANTED,
-        "n={n}: ask for at least 1 and at most {MAX_WANTED} rightmost roots"
+        "n={n}: give a number of roots from 1 to {MAX_WANTED}"
     );
     refuse_if!(
         h.kind() == Kind::Advanced,
-        "an advanced equation has roots arbitrarily far to the right: no root is the \
-         rightmost; the term with the highest power of s must not be delayed more than others"
+        "an advanced equation has roots arbitrarily far to the right, so no root is the \
+         rightmost. The term with the highest power of s must not have a longer delay than others"
     );
     match TimeScaling::of(h) {
         None => search(&Prepared::new(h)?, n, None, task),
@@ -205,7 +205,7 @@ pub(crate) fn abscissa_with(
     let abscissa = isolated.max(chain);
     if abscissa == f64::NEG_INFINITY {
         return Err(if h.degree() == 0 && h.delays().len() < 2 {
-            Error::argument("a constant has no roots, hence no spectral abscissa")
+            Error::argument("the function is constant, so it has no roots and no spectral abscissa")
         } else {
             beyond_reach()
         });
@@ -216,9 +216,9 @@ pub(crate) fn abscissa_with(
 /// The error for a rightmost root that exists but was not found.
 fn beyond_reach() -> Error {
     Error::argument(
-        "the rightmost root was not found: the numbers of this equation \
-         differ too much in size for double precision; leave out time constants close to zero, \
-              or choose another unit of time",
+        "the rightmost root was not found, because the sizes of the coefficients differ too much \
+         for double precision. Leave out time constants close to zero, or choose another unit of \
+         time",
     )
 }
 

@@ -42,7 +42,10 @@ pub fn sensitivity(
     terms: &[(f64, u32)],
     task: &Task,
 ) -> Result<(Complex64, Vec<Complex64>), Error> {
-    refuse_if!(!near.is_finite(), "root {near}: give a finite number");
+    refuse_if!(
+        !near.is_finite(),
+        "the root is {near}: give a finite number"
+    );
     let root = simple_root(h, near, task)?;
     let mut probe = Probe::new(h);
     probe.refer_to_dominant(root);
@@ -82,19 +85,20 @@ fn simple_root(h: &QuasiPolynomial, near: Complex64, task: &Task) -> Result<Comp
         Outcome::Stalled(place) => {
             let many = match cluster(&mut walker.probe, place, reach) {
                 Some(disc) => format!(
-                    "{} roots lie within {:.1e} of {}, which double-double arithmetic does not separate",
+                    "double-double arithmetic cannot separate {} roots that lie within {:.1e} of \
+                     {}",
                     disc.multiplicity, disc.radius, disc.center
                 ),
                 None => format!("rounding errors exceed the function near {place}"),
             };
             refuse!(
-                "the root {near} is not simple: {many}. A multiple root has no derivative, it \
-                 splits when a coefficient changes"
+                "the root {near} is not simple: {many}. A multiple root has no derivative, \
+                 because it splits when a coefficient changes"
             )
         }
         _ => refuse!(
-            "{near} is no root, and too far from the nearest one to identify it: give a root as `roots` or \
-             `rightmost` lists it"
+            "{near} is not a root, and too far from the nearest root: give a root from `roots` or \
+             `rightmost`"
         ),
     }
 }
@@ -130,6 +134,6 @@ mod tests {
         let refused = sensitivity(&cubed, Complex64::ZERO, &[], &Task::new());
         assert!(matches!(refused, Err(Error::Argument(m)) if m.contains("3 roots")));
         let far = sensitivity(&double, Complex64::new(3.0, 1.0), &[], &Task::new());
-        assert!(matches!(far, Err(Error::Argument(m)) if m.contains("no root")));
+        assert!(matches!(far, Err(Error::Argument(m)) if m.contains("not a root")));
     }
 }

@@ -49,19 +49,19 @@ impl CharacteristicMatrix {
         let size = e.len();
         refuse_if!(
             size == 0 || size > MAX_STATES,
-            "{size} states: give at least 1 and at most {MAX_STATES}"
+            "the system has {size} states: give 1 to {MAX_STATES} states"
         );
         for (delay, _) in n.iter().chain(&a) {
             refuse_if!(
                 !(delay.is_finite() && *delay >= 0.0),
-                "a delay of {delay} s: give finite ones, not below 0"
+                "a delay is {delay} s: give finite delays of zero or more"
             );
         }
         let all = || std::iter::once(&e).chain(n.iter().chain(&a).map(|(_, matrix)| matrix));
         for matrix in all() {
             refuse_if!(
                 matrix.len() != size || matrix.iter().any(|row| row.len() != size),
-                "a matrix is not {size} by {size}, as E is"
+                "E is {size} by {size}, but another matrix has another size"
             );
         }
         let is_used = |row: usize, column: usize| {
@@ -72,9 +72,9 @@ impl CharacteristicMatrix {
         let pattern: Vec<Vec<usize>> = (0..size).map(columns).collect();
         let Some(blocks) = blocks(&pattern) else {
             refuse!(
-                "the determinant of the characteristic matrix is zero for every s: the pattern of \
-                 zeros of E, N and A leaves an equation without a state, look for a row or a column \
-                 of zeros"
+                "the determinant of the characteristic matrix is zero for every s, because the \
+                 zeros of E, N and A leave an equation without a state. Look for a row or a \
+                 column of zeros"
             );
         };
         let mut kinds: Vec<((Matrix, ByDelay, ByDelay), u32)> = Vec::new();

@@ -43,8 +43,8 @@ fn close(system: &Irreducible, region: &Region, task: &Task) -> Result<Option<Cl
     if open {
         refuse_if!(
             re.0.is_infinite() && system.longest() > 0.0,
-            "the real part is open to the left: close it, far enough left delays make \
-             infinitely many roots"
+            "the region is open to the left, where delays make infinitely many roots: close the \
+             region"
         );
         let least = LEAST_RADIUS * system.rate();
         let radius = EDGE_MARGIN * Leading::new(system)?.radius(re.0, task)?.max(least);
@@ -116,7 +116,7 @@ pub(super) fn roots(system: &Irreducible, region: &Region, task: &Task) -> Resul
 pub(super) fn rightmost(system: &Irreducible, n: usize, task: &Task) -> Result<RootSet, Error> {
     refuse_if!(
         n == 0 || n > MAX_WANTED,
-        "n={n}: ask for at least 1 and at most {MAX_WANTED} rightmost roots of a matrix"
+        "n={n}: give a number of roots from 1 to {MAX_WANTED} for a matrix"
     );
     check_regular(system)?;
     let mut prepared = Prepared::new(system)?;
@@ -157,9 +157,9 @@ fn explained(system: &Irreducible, place: Option<Complex64>, error: Error, task:
             counted: disc.multiplicity.into(),
             found: Vec::new(),
             advice: format!(
-                "so many roots within {:.1e} of {:.6} are too close together for double precision, \
-                 because rounding the matrices moves them as far; is_stable() and count() do not \
-                 need each of them",
+                "the roots within {:.1e} of {:.6} are too close together for double precision, \
+                 because rounding the matrices moves these roots as far. Use is_stable() or \
+                 count(), which do not need each root",
                 disc.radius, disc.center
             ),
         },
@@ -178,8 +178,8 @@ pub(super) fn spectral_abscissa(system: &Irreducible, task: &Task) -> Result<f64
     let abscissa = isolated.max(chain_abscissa(system, task)?.1);
     refuse_if!(
         abscissa == f64::NEG_INFINITY,
-        "the rightmost root was not found: the numbers of this system \
-         differ too much in size for double precision; choose another unit of time"
+        "the rightmost root was not found, because the sizes of the coefficients differ too much \
+         for double precision. Choose another unit of time"
     );
     Ok(abscissa)
 }

@@ -559,7 +559,7 @@ pub(super) fn check_regular(system: &Irreducible) -> Result<(), Error> {
     }
     Err(Error::argument(
         "the determinant of the characteristic matrix is zero for every s, or too close to zero \
-         to decide: the equations do not determine the state. Look for rows of E, N and A that \
+         to decide. So the equations do not determine the state. Look for rows of E, N and A that \
          depend on one another, or for entries that differ too much in size",
     ))
 }

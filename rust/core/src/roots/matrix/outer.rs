@@ -66,9 +66,8 @@ impl Leading {
         let (e, _) = system.dense(0);
         let singular = || {
             Error::argument(
-                "E is singular, or too close to it to verify its inverse: half planes need an E \
-                 that can be inverted; eliminate algebraic equations, or ask for a region whose \
-                 four sides are closed",
+                "E is singular, or too close to singular, but a half plane needs an E that can be \
+                 inverted. Eliminate algebraic equations, or give a region with four closed sides",
             )
         };
         let inverse = factor(real(&e)).ok_or_else(singular)?.inverse;
@@ -158,7 +157,7 @@ impl Leading {
         let slopes = weighted(&self.slopes, &weights);
         let beyond = || {
             Error::argument(format!(
-                "right of Re s = {sigma:e} the roots are more than double precision can bound: \
+                "right of Re s = {sigma:e} there are more roots than double precision can bound: \
                  close the region on the left"
             ))
         };
@@ -226,8 +225,8 @@ impl Leading {
             Err(beyond())
         } else {
             refuse!(
-                "the half plane right of Re s = {sigma} holds infinitely many roots, or cannot be \
-                 shown to hold finitely many: it must lie right of the chains (chain_abscissa)"
+                "the half plane right of Re s = {sigma} may contain infinitely many roots: give a \
+                 half plane right of the chains (chain_abscissa)"
             )
         }
     }

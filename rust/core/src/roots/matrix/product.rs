@@ -168,7 +168,8 @@ pub fn spectral_abscissa(
     }
     refuse_if!(
         system.parts().is_empty(),
-        "the system has no poles, hence no spectral abscissa: no equation has a derivative or a delay"
+        "no equation has a derivative or a delay, so the system has no poles and no spectral \
+         abscissa"
     );
     Ok(largest)
 }
@@ -176,8 +177,8 @@ pub fn spectral_abscissa(
 fn judged_exactly(known: bool, strong: f64) -> Result<(), Error> {
     refuse_if!(
         !known,
-        "strong=False: with its delays taken as exact, a neutral system of coupled states is judged \
-         by its expanded determinant, which this one does not have; its strong abscissa is \
+        "strong=False takes the delays as exact. For a neutral system of coupled states this \
+         needs an expanded determinant, which this system does not have. Its strong abscissa is \
          {strong:.6} 1/s"
     );
     Ok(())

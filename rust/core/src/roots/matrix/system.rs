@@ -76,8 +76,8 @@ impl Irreducible {
                 for (sum, x) in sums.iter_mut().zip(row) {
                     refuse_if!(
                         *x != 0.0 && !USABLE.contains(&x.abs()),
-                        "an entry of {x:e}: entries other than zero must lie between 1e-100 \
-                         and 1e100 in modulus; choose other units"
+                        "an entry is {x:e}, but entries other than zero must have a modulus \
+                         between 1e-100 and 1e100: choose other units"
                     );
                     *sum += if is_slope { *x } else { -x };
                 }

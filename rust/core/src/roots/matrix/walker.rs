@@ -98,7 +98,7 @@ impl<'a> MatrixWalker<'a> {
                 what: "the search for roots of a matrix",
                 limit: self.limit.min(self.evaluations),
                 unit: "factorisations",
-                advice: "take a smaller region, or keep its edges clear of chains of roots".into(),
+                advice: "give a smaller region, or edges that are far from chains of roots".into(),
             });
         }
         Ok(())

@@ -112,8 +112,9 @@ impl Ratio {
             None if hidden.counted > 0 && searched == f64::NEG_INFINITY => Ok(searched),
             None if hidden.counted > 0 && chain == f64::NEG_INFINITY => {
                 Err(Error::argument(format!(
-                    "all {} roots of the denominator right of {searched:.6} are roots of the \
-                     numerator as well: no pole was found; divide out the common factors",
+                    "no pole was found, because all {} roots of the denominator right of \
+                     {searched:.6} are roots of the numerator as well: divide out the common \
+                     factors",
                     hidden.counted
                 )))
             }

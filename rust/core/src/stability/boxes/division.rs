@@ -114,7 +114,7 @@ pub fn proved_boxes(
 pub(crate) fn check(family: &Family, ranges: &[(f64, f64)]) -> Result<Vec<usize>, Error> {
     refuse_if!(
         ranges.len() != family.names().len(),
-        "{} ranges for {} parameters ({}): give one range for each parameter",
+        "{} ranges are given for {} parameters ({}): give one range for each parameter",
         ranges.len(),
         family.names().len(),
         family.names().join(", ")
@@ -122,7 +122,7 @@ pub(crate) fn check(family: &Family, ranges: &[(f64, f64)]) -> Result<Vec<usize>
     for (name, (low, high)) in family.names().iter().zip(ranges) {
         refuse_if!(
             !(low.is_finite() && high.is_finite() && (high - low).is_finite() && low <= high),
-            "{name} from {low} to {high}: the ends of a range must be finite and in order"
+            "{name} from {low} to {high}: give a range with finite ends, the smaller one first"
         );
     }
     family.check_delays(ranges)?;
@@ -134,7 +134,8 @@ pub(crate) fn check(family: &Family, ranges: &[(f64, f64)]) -> Result<Vec<usize>
         .collect();
     refuse_if!(
         varying.len() > MOST_PARAMETERS,
-        "{} parameters vary ({}): boxes have up to {MOST_PARAMETERS}, give the others values",
+        "{} parameters vary ({}), but boxes have at most {MOST_PARAMETERS}: give the other \
+         parameters a value",
         varying.len(),
         family.names().join(", ")
     );

@@ -47,7 +47,7 @@ pub fn largest_stable_box(
         let inside = |((low, high), value): (&(f64, f64), &f64)| low <= value && value <= high;
         refuse_if!(
             point.len() != ranges.len() || !ranges.iter().zip(point).all(inside),
-            "the point that the box has to contain lies outside the ranges"
+            "the point that the box has to contain is outside of the ranges"
         );
     }
     match varying.len() {

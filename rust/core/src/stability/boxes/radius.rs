@@ -86,22 +86,22 @@ pub fn stability_radius(
 ) -> Result<Radius, Error> {
     refuse_if!(
         scales.len() != point.len(),
-        "{} scales for {} parameters: give one for each parameter",
+        "{} scales are given for {} parameters: give one scale for each parameter",
         scales.len(),
         point.len()
     );
     if let Some(scale) = scales.iter().find(|s| !(s.is_finite() && **s >= 0.0)) {
-        refuse!("scale {scale}: scales must be finite and not negative");
+        refuse!("a scale is {scale}, but scales must be finite and not negative");
     }
     let cell = judge(&family.at(point)?, Specification::default(), false, task)?;
     refuse_if!(
         cell.unstable != 0,
-        "the member at this point is not stable, or too close to the stability boundary \
-         to decide: start from a stable point"
+        "at this point the equation is not stable, or too close to the stability boundary to \
+         decide: start from a stable point"
     );
     refuse_if!(
         scales.iter().all(|scale| *scale == 0.0),
-        "all scales are 0: give the parameters that may move a scale above 0"
+        "all scales are 0: give each parameter that may change a scale above 0"
     );
     let floored = |index: usize| {
         let slope = |delay: &crate::stability::family::Affine| delay.slopes.get(index).copied();

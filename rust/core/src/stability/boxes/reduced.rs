@@ -195,8 +195,8 @@ impl<'a, const D: usize> Reduced<'a, D> {
         refuse_if!(
             sums.iter()
                 .all(|(_, sum, size)| sum.abs() <= rounding * size),
-            "s = 0 is a root for all values of the parameters, so that no member is stable: \
-             cancel the factor s to judge the other roots"
+            "s = 0 is a root for all values of the parameters, so the equation is never stable: \
+             divide the equation by s to examine the other roots"
         );
         Ok(())
     }

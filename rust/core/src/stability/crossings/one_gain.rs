@@ -65,7 +65,7 @@ pub fn crossings_along(
     }
     family.check_delays(&ranges)?;
     let Some((constant, slope)) = family.split(parameter) else {
-        refuse!("{name} does not enter only as a factor of terms");
+        refuse!("{name} does not appear only as a factor of terms");
     };
     let mut bare = values.to_vec();
     if let Some(value) = bare.get_mut(parameter) {
@@ -77,7 +77,7 @@ pub fn crossings_along(
     }
     refuse_if!(
         at_zero(&a) == 0.0 && at_zero(&b) == 0.0,
-        "a root stays at s = 0 whatever {name} is: divide the equation by s"
+        "a root stays at s = 0 for all values of {name}: divide the equation by s"
     );
     let top = radius_of_members(&a, &b, range, name)?;
     if top == 0.0 {
@@ -94,8 +94,9 @@ pub fn crossings_along(
     };
     let Some(found) = found else {
         refuse!(
-            "the crossings over {name} are beyond double precision: a root may stay on the \
-             imaginary axis whatever {name} is, or coefficients differ by too many decades"
+            "double precision cannot find the crossings over {name}. Either a root stays on the \
+             imaginary axis for all values of {name}, or the sizes of the coefficients differ too \
+             much"
         );
     };
     Ok(found)
@@ -142,14 +143,14 @@ pub(crate) fn radius_of_members(
     let (leading, rest) = (leading.unwrap_or(0.0), rest.copied().unwrap_or(0.0));
     refuse_if!(
         leading == 0.0,
-        "the coefficient of the highest power of s without further delay vanishes for some {name} of the \
-         range: choose a range in which it keeps its sign"
+        "for some {name} of the range, the coefficient of the highest power of s without further \
+         delay is zero: choose a range in which this coefficient keeps its sign"
     );
     let excess = leading * (1.0 - ROOM) - rest * (1.0 + ROOM);
     refuse_if!(
         excess.is_nan() || excess <= 0.0,
-        "the equation is neutral, and for some {name} of the range chains of infinitely many roots \
-         may reach the imaginary axis: choose a smaller range"
+        "the equation is neutral, and for some {name} of the range, chains of infinitely many \
+         roots may reach the imaginary axis: choose a smaller range"
     );
     Ok(exceeding_radius(others, excess))
 }

@@ -79,8 +79,8 @@ pub fn held_map(
             limit: MAX_CELLS as u64,
             unit: "cells",
             advice: format!(
-                "{} by {} points were requested: take fewer points, or several maps of smaller \
-                 ranges",
+                "{} by {} points are too many for a map: give fewer points, or make several maps \
+                 of smaller ranges",
                 rows.rows,
                 rows.points.len()
             ),
@@ -199,7 +199,7 @@ impl<'a> LoopRows<'a> {
         let used = self.number("the number of states", self.used, row)?;
         refuse_if!(
             !(used >= 0.0 && used <= self.states as f64),
-            "{used} states are used of {}",
+            "{used} states are used, but there are {}",
             self.states
         );
         Ok(used as usize)

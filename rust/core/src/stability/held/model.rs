@@ -75,16 +75,17 @@ impl LoopPolynomials {
         let n = b.len();
         refuse_if!(
             n > MOST_STATES,
-            "{n} states of plant and controller: a map of a sampled loop takes up to {MOST_STATES}"
+            "plant and controller have {n} states, but a map of a sampled loop can have at most \
+             {MOST_STATES}"
         );
         refuse_if!(
             !(delay.is_finite() && delay >= 0.0 && sample_time.is_finite() && sample_time > 0.0),
-            "delay={delay}, sample_time={sample_time}: delays are zero or more, sample times above \
-             zero, in s"
+            "delay={delay}, sample_time={sample_time}: give a delay of zero or more and a sample \
+             time above zero, in s"
         );
         refuse_if!(
             a.iter().chain(b).any(|entry| !entry.is_finite()),
-            "an entry of the equations is not finite: choose smaller gains"
+            "a coefficient of the equations is not finite: give smaller gains"
         );
         countable(delay, sample_time)?;
         Ok(Self::double((a, b), None, delay, sample_time))
@@ -99,7 +100,7 @@ impl LoopPolynomials {
         let n = equations.b.len();
         refuse_if!(
             n > MOST_STATES,
-            "{n} states of plant and controller: up to {MOST_STATES} are taken"
+            "plant and controller have {n} states, but at most {MOST_STATES} are possible"
         );
         countable(delay, sample_time)?;
         let states = (&equations.a[..], &equations.b[..]);

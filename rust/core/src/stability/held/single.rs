@@ -49,7 +49,7 @@ impl<'a> HeldLoop<'a> {
     pub fn new(plant: &'a LinearLoop) -> Result<Self, Error> {
         match plant.sample_time() {
             Some(sample_time) => Ok(Self { plant, sample_time }),
-            None => refuse!("a continuous loop has no hold: give it a sample_time"),
+            None => refuse!("a continuous loop has no hold: give the loop a sample_time"),
         }
     }
 
@@ -256,8 +256,8 @@ impl<'a> HeldLoop<'a> {
                 .all(|p| p.coefficients.iter().all(|c| c.is_finite()));
         refuse_if!(
             !known,
-            "the coefficients of this sampled loop are beyond double precision: choose units in \
-             which its gains and time constants are moderate"
+            "the coefficients of this sampled loop exceed double precision: choose other units \
+             for its gains and time constants"
         );
         Ok(HeldNumbers {
             hold: Hold {

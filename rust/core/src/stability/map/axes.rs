@@ -20,7 +20,7 @@ impl Axis<'_> {
     /// [`Error::Argument`] where a point is not finite.
     pub(crate) fn range(&self) -> Result<Option<(f64, f64)>, Error> {
         if let Some(point) = self.points.iter().find(|point| !point.is_finite()) {
-            refuse!("{point} on an axis: its points must be finite");
+            refuse!("an axis contains {point}, but its points must be finite");
         }
         let low = self.points.iter().copied().fold(f64::INFINITY, f64::min);
         let high = self
@@ -41,7 +41,8 @@ pub(crate) fn check_parameters(family: &Family, axes: [Axis<'_>; 2]) -> Result<(
     let [first, second] = axes;
     refuse_if!(
         first.parameter == second.parameter || first.parameter.max(second.parameter) >= count,
-        "axes along parameters {} and {} of {count}: a map needs two different ones",
+        "the axes are along parameters {} and {} of {count}, but a map needs two different \
+         parameters",
         first.parameter,
         second.parameter
     );

@@ -210,8 +210,8 @@ fn check(family: &Family, values: &[f64], axes: [Axis<'_>; 2]) -> Result<usize, 
             limit: MAX_CELLS as u64,
             unit: "cells",
             advice: format!(
-                "{} by {} points were requested: take fewer points, or several maps of \
-                 smaller ranges",
+                "{} by {} points are too many for a map: give fewer points, or make several maps \
+                 of smaller ranges",
                 first.points.len(),
                 second.points.len()
             ),

@@ -24,7 +24,7 @@ pub(super) fn endless() -> Error {
         what: "the continuous response",
         limit: MOST_ELEMENTS,
         unit: "elements of time",
-        advice: "shorten the time simulated; set delays and lags close to zero to exactly zero"
+        advice: "simulate a shorter time, and set delays and lags close to zero to exactly zero"
             .to_owned(),
     }
 }

@@ -102,13 +102,13 @@ fn check<S: Scalar>(plant: &LinearLoop<S>) -> Result<(), Error> {
     let jumps = plant.stops().is_some() || plant.rate().is_some();
     refuse_if!(
         jumps && !l.is_nothing(),
-        "the command passes straight back to itself (L = {}), and its rate is bounded or its integral \
-         stops: give the derivative a DerivativeFilter",
+        "the command feeds back to itself without delay (L = {}), but its rate is limited or its \
+         integral stops: give the derivative a DerivativeFilter",
         l.value()
     );
     refuse_if!(
         S::MOVES && plant.stops().is_some(),
-        "conditional integration in continuous time has no derivatives by numbers of the loop: use \
+        "sensitivities cannot be computed for conditional integration in continuous time: use \
          back-calculation or a sample_time"
     );
     Ok(())

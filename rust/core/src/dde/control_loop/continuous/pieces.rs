@@ -197,7 +197,8 @@ impl<S: Scalar> Pieces<S> {
                 limit: MOST_PIECES as u64,
                 unit: "pieces of the command in one delay",
                 advice:
-                    "shorten the time simulated or the list of reference jumps, and set lags close to zero to exactly zero"
+                    "simulate a shorter time or fewer reference jumps, and set lags close to zero \
+                     to exactly zero"
                         .to_owned(),
             });
         }

@@ -308,7 +308,7 @@ fn check(blocks: &Blocks, settings: &Settings, rest: &Rest) -> Result<(), Error>
         && rest.state.len() == n + m;
     refuse_if!(
         !fits,
-        "the matrices of {n} plant and {m} controller states, or the {} initial states, do \
+        "the matrices of {n} plant states and {m} controller states, or the {} initial states, do \
          not fit together",
         rest.state.len()
     );
@@ -324,8 +324,8 @@ fn check(blocks: &Blocks, settings: &Settings, rest: &Rest) -> Result<(), Error>
     );
     refuse_if!(
         settings.delay == 0.0 && blocks.plant_direct != 0.0,
-        "without a delay, a plant that passes its command straight to its output (D={}) makes \
-         an algebraic loop, which fixed steps cannot run: use the exact simulation",
+        "without a delay, a plant with direct feedthrough (D={}) makes an algebraic loop, which \
+         fixed steps cannot simulate: use the exact simulation",
         blocks.plant_direct
     );
     refuse_if!(

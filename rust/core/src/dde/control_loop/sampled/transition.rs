@@ -108,7 +108,7 @@ pub fn transition_matrix(plant: &LinearLoop) -> Result<(Vec<f64>, usize), Error>
 /// The transition matrix, its sample and the sample time.
 fn closed(plant: &LinearLoop) -> Result<(Vec<f64>, Sample, f64), Error> {
     let Some(sample_time) = plant.sample_time() else {
-        refuse!("a continuous loop has no transition matrix: give it a sample_time");
+        refuse!("a continuous loop has no transition matrix: give the loop a sample_time");
     };
     let equations = plant.equations();
     check_size(equations.states(), plant.delay(), sample_time)?;
@@ -175,8 +175,8 @@ fn check_size(n: usize, delay: f64, sample_time: f64) -> Result<(), Error> {
             limit: MOST_STATES as u64,
             unit: "states",
             advice: format!(
-                "the delay of {delay} s holds too many samples of {sample_time} s: lengthen the \
-                 sample time or treat the loop as continuous"
+                "the delay of {delay} s has too many samples of {sample_time} s: give a longer \
+                 sample time, or treat the loop as continuous"
             ),
         });
     }
