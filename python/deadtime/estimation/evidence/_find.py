@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, TypeAlias, cast
@@ -17,7 +17,7 @@ from deadtime.estimation.evidence._candidate import CLEAR, candidate_of
 from deadtime.estimation.evidence._causes import causes_of, sensor_faults_of
 from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._numbers import FittedRecording
-from deadtime.estimation.evidence._question import Between, Question, questions_of
+from deadtime.estimation.evidence._question import Question, questions_of
 from deadtime.estimation.evidence._words import (
     LEVELS,
     ROUNDING,
@@ -26,7 +26,6 @@ from deadtime.estimation.evidence._words import (
     moves_in,
     reason_of,
 )
-from deadtime.loops import Controller
 from deadtime.recordings import Recording
 
 #: Lower and upper end of an interval.
@@ -35,37 +34,18 @@ Ends: TypeAlias = tuple[float, float]
 
 def estimate_by_evidence(
     recording: Recording | Sequence[Recording],
-    *,
-    window: OpenRange | Sequence[OpenRange | None] | None = None,
-    closed_loop: bool | None = None,
-    at_rest: bool | None = None,
-    largest_delay: float | None = None,
-    integrates: bool | None = None,
-    between: Between = "undecided",
-    hold: float | None = None,
-    plant: str | None = None,
-    controller: Controller | Sequence[Controller] | None = None,
-    limit: float | None = None,
-    causes: bool | None = None,
-    progress: Callable[[int], object] | None = None,
+    window: OpenRange | Sequence[OpenRange | None] | None,
+    known: Mapping[str, Any],
+    progress: Callable[[int], object] | None,
 ) -> PlantEstimate:
-    """The plant that recordings show; what is not given is taken from them."""
-    known = {
-        "at_rest": at_rest,
-        "largest_delay": largest_delay,
-        "integrates": integrates,
-        "between": between,
-        "hold": hold or 0.0,
-        "plant": plant,
-        "causes": causes is not False,
-    }
-    question = questions_of(recording, window, controller, limit, closed_loop, known)
+    """The plant that recordings show; what is not `known` by its name is taken from them."""
+    question = questions_of(recording, window, known)
     found = question.answer(progress=progress)
     first = estimate_of(question, found)
     moves_at_all = any(np.ptp(one.command) > 0.0 for one in question.each)
     if first.at_rest or moves_in(first) or not moves_at_all:
         return _beside_all(first, found)
-    if at_rest is False:
+    if question.at_rest is False:
         return replace(first, verdict="none", reason=TOO_EARLY)
     question = replace(question, at_rest=True)
     found = question.answer()

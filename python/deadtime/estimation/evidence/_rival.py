@@ -105,7 +105,7 @@ def _question(run: Run) -> Question | None:
     controller, limit = (loop.controller, loop.limit) if computed else (None, None)
     recording, window = _most_excited(run)
     try:
-        return question_of(recording, window, None, controller, limit, {"causes": False})
+        return question_of(recording, window, controller, {"limit": limit, "causes": False})
     except DeadtimeError:
         return None
 

@@ -9,17 +9,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+import deadtime.estimation._native as native
 from deadtime._base.arrays import Indices, Mask
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.verdicts import verdict_if
-from deadtime.estimation._native import (
-    FlightFit,
-    FlightProfile,
-    FlightRows,
-    FreeNumbers,
-    RoundedPeak,
-    RoundedReadings,
-)
 from deadtime.estimation._result import REASONS, CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import LEAST_GAIN, standard_errors
 from deadtime.estimation.fit._least_squares import JointModel, Model
@@ -35,11 +28,11 @@ LESS = 1.5
 
 
 def profile_for(
-    fit: FlightFit,
+    fit: native.FlightFit,
     intervals: Literal["all", "sum"] = "all",
     covariance: Sequence[float] | None = None,
-    numbers: FreeNumbers | None = None,
-) -> FlightProfile:
+    numbers: native.FreeNumbers | None = None,
+) -> native.FlightProfile:
     """The profile over what is fitted, and over the sum of delay and lag.
 
     With the covariance of a fit whose commands are functions of its plant, or with numbers that
@@ -61,7 +54,7 @@ def concluded_flight(
     method: str,
     names: tuple[str, ...],
     runs: Sequence[Run],
-    profile: FlightProfile,
+    profile: native.FlightProfile,
     message: str,
     details: Mapping[str, Any],
     adequacy: Adequacy,
@@ -110,7 +103,7 @@ def concluded_flight(
     )
 
 
-def _noise_of(fit: FlightFit, run: int) -> FlightNoise:
+def _noise_of(fit: native.FlightFit, run: int) -> FlightNoise:
     one, (trim, white) = fit.numbers.noise[run], fit.trim_and_white(run)
     return FlightNoise(
         white=white,
@@ -122,13 +115,13 @@ def _noise_of(fit: FlightFit, run: int) -> FlightNoise:
     )
 
 
-def gain_is_certain(profile: FlightProfile) -> bool:
+def gain_is_certain(profile: native.FlightProfile) -> bool:
     """Whether the gain is fitted and far from zero."""
     error = dict(profile.stderr).get("gain", math.inf)
     return abs(profile.fit.gain) > 2.0 * LEAST_GAIN * error
 
 
-def explains_less(fit: FlightFit, white: FlightFit) -> bool:
+def explains_less(fit: native.FlightFit, white: native.FlightFit) -> bool:
     """Whether the plant beside the noise explains far less of a recording than by least squares."""
     return any(
         float(np.std(part.residuals)) > LESS * float(np.std(least.residuals))
@@ -173,7 +166,7 @@ def _message(
     return f"{text}; {unseen_in_words(unseen)} have been seen"
 
 
-def rounding_is_all(fit: FlightFit) -> bool:
+def rounding_is_all(fit: native.FlightFit) -> bool:
     """Whether every recording is rounded, and has no other noise than white beside."""
     return all(
         rows.rounding > 0.0 and not (one.air or one.sensor or one.stamps or one.arrivals)
@@ -184,7 +177,7 @@ def rounding_is_all(fit: FlightFit) -> bool:
 def read_as_intervals(
     estimate: DelayEstimate,
     models: Sequence[CommandedModel],
-    first: Sequence[FlightRows],
+    first: Sequence[native.FlightRows],
     repeated: Sequence[Indices],
 ) -> DelayEstimate:
     """The estimate with each row as the interval that was rounded to it.
@@ -200,11 +193,11 @@ def read_as_intervals(
         Rows of each recording that repeat the one before.
     """
     profile = estimate._profile
-    assert isinstance(profile, FlightProfile)
+    assert isinstance(profile, native.FlightProfile)
     fit = profile.fit
     parts = tuple(one.started(fit, {}) for one in models)
     model: Model = parts[0] if len(parts) == 1 else JointModel(parts, (1.0,) * len(parts))
-    readings = RoundedReadings(
+    readings = native.RoundedReadings(
         np.concatenate([one.recording.output for one in parts]),
         np.repeat(np.arange(len(parts)), model.sizes),
         np.concatenate([_read(*each) for each in zip(first, fit.runs, repeated, strict=True)]),
@@ -245,7 +238,7 @@ def read_as_intervals(
     )
 
 
-def _read(first: FlightRows, fitted: FlightRows, repeated: Indices) -> Mask:
+def _read(first: native.FlightRows, fitted: native.FlightRows, repeated: Indices) -> Mask:
     """Rows that are read as intervals: all but outliers and those that repeat the one before."""
     mask = ~(first.used & ~fitted.used)
     mask[repeated] = False
@@ -257,8 +250,8 @@ class RoundedCost:
     """-2 ln L with one quantity held, as the cost of a `Profile` whose variance is one."""
 
     model: Model
-    readings: RoundedReadings
-    peak: RoundedPeak
+    readings: native.RoundedReadings
+    peak: native.RoundedPeak
     known: Mapping[str, float]
     freedom: int
 

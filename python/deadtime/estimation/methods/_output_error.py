@@ -15,15 +15,8 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
+import deadtime.estimation._native as native
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._native import (
-    LONGEST_DELAY,
-    MOST_NUMBERS,
-    FlightFit,
-    FlightPlant,
-    FlightProfile,
-    FlightRows,
-)
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
 from deadtime.estimation.data._known_filter import KnownFilter
@@ -154,7 +147,7 @@ def estimate_from_commands(
 def _criterion(estimate: DelayEstimate) -> float:
     """Akaike's criterion of a fit with noise; infinite of least squares."""
     profile = estimate._profile
-    return profile.fit.criterion if isinstance(profile, FlightProfile) else math.inf
+    return profile.fit.criterion if isinstance(profile, native.FlightProfile) else math.inf
 
 
 def _estimated(
@@ -225,11 +218,11 @@ class _Begun:
     names: _Names
     assumed: Assumed
     models: list[CommandedModel]
-    rows: list[FlightRows]
+    rows: list[native.FlightRows]
     checks: list[RecordingCheck | None]
-    white: FlightFit
+    white: native.FlightFit
     numbers: dict[str, float]
-    whole: FlightFit
+    whole: native.FlightFit
 
     @property
     def criterion(self) -> float:
@@ -289,7 +282,7 @@ class _Begun:
 class _Likeliest(NamedTuple):
     """The likeliest plant and noise, doubts about its commands, and the recordings with it."""
 
-    profile: FlightProfile
+    profile: native.FlightProfile
     doubts: tuple[str, ...]
     fitted: list[Run]
 
@@ -321,12 +314,12 @@ def _likeliest(begun: _Begun) -> _Likeliest:
     return _Likeliest(profile, doubts * unclear, fitted)
 
 
-def _check_delay(begun: _Begun, profile: FlightProfile) -> None:
+def _check_delay(begun: _Begun, profile: native.FlightProfile) -> None:
     """Refuse a fit at the longest delay, and one that explains hardly more than a constant does."""
-    longest = min(LONGEST_DELAY * one.span for one in begun.models)
+    longest = min(native.LONGEST_DELAY * one.span for one in begun.models)
     if "delay" in begun.names.free and profile.fit.numbers.delay >= longest * (1.0 - 1e-3):
         raise NotIdentifiableError(
-            f"the fit ends at a delay of {longest:g} s, {LONGEST_DELAY:g} of the window, so "
+            f"the fit ends at a delay of {longest:g} s, {native.LONGEST_DELAY:g} of the window, so "
             "the output is not a response to this command. Check columns and units, or choose "
             "a longer window"
         )
@@ -335,7 +328,7 @@ def _check_delay(begun: _Begun, profile: FlightProfile) -> None:
 
 
 def _without_the_plant(
-    begun: _Begun, profile: FlightProfile, adequacy: Adequacy
+    begun: _Begun, profile: native.FlightProfile, adequacy: Adequacy
 ) -> DelayEstimate | None:
     """The estimate of least squares where the noise stands for what the plant lacks."""
     astray = adequacy.reasons and explains_less(profile.fit, begun.whole)
@@ -396,7 +389,7 @@ def _begun_with(method: str, runs: Sequence[Run], names: _Names, assumed: Assume
     ]
     given, known = partial(_given, names, assumed, models, rows), models[0].known
     first = [known[name] for name in names.others]
-    white, found = FlightFit.first(given, first, known["delay"], known["gain"])
+    white, found = native.FlightFit.first(given, first, known["delay"], known["gain"])
     numbers = dict(zip(names.others, found, strict=True))
     whole = white.on(given(found)[1])
     return _Begun(method, runs, names, assumed, models, rows, checks, white, numbers, whole)
@@ -404,10 +397,10 @@ def _begun_with(method: str, runs: Sequence[Run], names: _Names, assumed: Assume
 
 def _check_others(names: Sequence[str], known: Mapping[str, float]) -> None:
     """Refuse numbers that cannot be searched around the rest."""
-    if len(names) > MOST_NUMBERS:
+    if len(names) > native.MOST_NUMBERS:
         raise ValueError(
             f"{', '.join(names)} are {len(names)} parameters besides gain, delay, lags and "
-            f"zero: fit at most {MOST_NUMBERS} of them"
+            f"zero: fit at most {native.MOST_NUMBERS} of them"
         )
     for name in names:
         if known[name] == 0.0:
@@ -420,9 +413,9 @@ def _given(
     names: _Names,
     assumed: Assumed,
     models: Sequence[CommandedModel],
-    rows: Sequence[FlightRows],
+    rows: Sequence[native.FlightRows],
     found: Sequence[float],
-) -> tuple[FlightPlant, list[FlightRows]]:
+) -> tuple[native.FlightPlant, list[native.FlightRows]]:
     """The plant with such other numbers, and the rows with the commands that it gets."""
     plant, values = models[0].plant, dict(zip(names.others, found, strict=True))
     if values:
@@ -431,7 +424,7 @@ def _given(
     return plant_model(plant, names.linear, assumed.air == "vehicle"), within
 
 
-def _is_nearly_exact(fit: FlightFit, models: Sequence[CommandedModel]) -> bool:
+def _is_nearly_exact(fit: native.FlightFit, models: Sequence[CommandedModel]) -> bool:
     """Whether all that is left may be rounding."""
     return all(
         float(np.max(np.abs(part.residuals))) <= NEARLY_EXACT * float(np.ptp(one.recording.output))

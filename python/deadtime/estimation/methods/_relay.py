@@ -22,16 +22,10 @@ from typing import ClassVar
 
 import numpy as np
 
+import deadtime.estimation._native as native
 from deadtime._base.arrays import Array, Indices
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
-from deadtime.estimation._native import (
-    HeldResponse,
-    cycle_crossings,
-    cycle_delay_by_lag,
-    cycle_delays,
-    cycle_switches,
-)
 from deadtime.estimation.data._checks import integrator_of
 from deadtime.estimation.data._step_reading import noise_of_second_differences
 from deadtime.estimation.methods._conclusion import OfOne, Read
@@ -89,12 +83,12 @@ class Relay(OfOne):
         error = data.output - data.reference
         # Second differences of straight lines are noise, except at the corners.
         noise = noise_of_second_differences(error)
-        crossings = cycle_crossings(data.time, error, noise)[LEFT_OUT:]
+        crossings = native.cycle_crossings(data.time, error, noise)[LEFT_OUT:]
         _check_cycle(crossings, error, data.time)
         switches = _switches(data.time, signs, crossings, loop.is_sampled)
         half = float(np.mean(np.diff(crossings)))
-        count, mean, stderr = cycle_delays(crossings, switches)
-        delay = mean - cycle_delay_by_lag(plant.lag, half)
+        count, mean, stderr = native.cycle_delays(crossings, switches)
+        delay = mean - native.cycle_delay_by_lag(plant.lag, half)
         if delay <= 0.0:
             raise NotIdentifiableError(
                 f"lag and hold explain a quarter of the period, {0.5 * half:.3g} s. Either "
@@ -186,7 +180,7 @@ def _switches(time: Array, signs: Array, crossings: Array, sampled: bool) -> Arr
     """Time of the switch at each crossing but the last; the crossing itself without samples."""
     if not sampled:
         return crossings[:-1]
-    counts, times = cycle_switches(time, signs, crossings)
+    counts, times = native.cycle_switches(time, signs, crossings)
     for count, crossing in zip(counts, crossings, strict=False):
         if count % 2 == 0:
             raise NotIdentifiableError(
@@ -209,6 +203,6 @@ def _path(
     first = -1.0 if data.output[rows[0]] > data.reference[rows[0]] else 1.0
     values = np.full(switches.size, first)
     values[::2] = -first
-    path = HeldResponse(switches, values).at(data.time[rows] - delay, lag).value
+    path = native.HeldResponse(switches, values).at(data.time[rows] - delay, lag).value
     output = data.output[rows]
     return rows, path - path.mean(), output - output.mean()
