@@ -18,14 +18,7 @@ from deadtime.estimation.evidence._causes import causes_of, sensor_faults_of
 from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._numbers import FittedRecording
 from deadtime.estimation.evidence._question import Question, questions_of
-from deadtime.estimation.evidence._words import (
-    LEVELS,
-    ROUNDING,
-    TAKEN_AT_REST,
-    TOO_EARLY,
-    moves_in,
-    reason_of,
-)
+from deadtime.estimation.evidence._words import TAKEN_AT_REST, TOO_EARLY, moves_in, reason_of
 from deadtime.recordings import Recording
 
 #: Lower and upper end of an interval.
@@ -133,21 +126,16 @@ def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
         "plant": None if best is None else best.plant,
         "parameters": {} if best is None else dict(best.parameters),
     }
-    step = _coarse_step(runs)
+    steps = [native.coarse_step(run.recording.output, run.noise_std) for run in runs]
+    step = next(filter(None, steps), 0.0)
     verdict = "indication" if step and found.verdict == "reliable" else found.verdict
     return PlantEstimate(
         verdict=cast(Verdict, verdict),
         reason=reason_of(found.reason, found, _is_one_step(question), step),
         **numbers,
-        crossover=found.crossover,
-        largest_gain=found.largest_gain,
+        **found.shown,
         candidates=candidates,
-        intervals={name: (float(low), float(high)) for name, (low, high) in found.hull.items()},
-        determined=found.told,
-        asked=found.asked,
         shift=found.shift + question.shift,
-        at_rest=found.at_rest,
-        excited=np.array(found.excited, dtype=float),
         recording=question.recording,
         fitted=runs[0].fitted,
         residuals=runs[0].residuals,
@@ -157,11 +145,6 @@ def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
         _own_noise=runs[0].noise_std,
         _code=found.reason,
         _question=question,
-        _at_crossover=(
-            found.gain_at_crossover,
-            found.phase_at_crossover,
-            found.delay_at_crossover,
-        ),
         _native=[found],
     )
 
@@ -169,22 +152,6 @@ def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
 def _is_one_step(question: Question) -> bool:
     """Whether the command changes once, in one recording."""
     return not question.others and np.count_nonzero(np.diff(question.command)) == 1
-
-
-def _coarse_step(runs: Sequence[FittedRecording]) -> float:
-    """Step of a sensor that is coarse for how far it moves and beside its noise; zero of others."""
-    for run in runs:
-        output = run.recording.output
-        output = output[np.isfinite(output)]
-        span = float(np.ptp(output)) if output.size else 0.0
-        moves = np.abs(np.diff(output))
-        moves = moves[moves > 1e-9 * span]
-        step = float(moves.min()) if moves.size else 0.0
-        multiples = moves / step
-        are_whole = np.allclose(multiples, np.round(multiples), atol=0.01)
-        if are_whole and span < LEVELS * step and run.noise_std < ROUNDING * step:
-            return step
-    return 0.0
 
 
 def _run(question: Question, first: native.FamilyCandidate | None, place: int) -> FittedRecording:

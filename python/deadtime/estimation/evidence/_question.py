@@ -98,13 +98,11 @@ class Question(ReadOnlyArrays):
 
     def answer(
         self,
-        level: float = 0.95,
-        omega: Sequence[float] = (),
         progress: Callable[[int], object] | None = None,
         known: native.FamilyFit | None = None,
         noise: str | None = None,
     ) -> native.FamilyFit:
-        """Ask the kernel; every interval of the answer has this level.
+        """Ask the kernel; every interval of the answer is one of 95 %.
 
         With the answer to fewer rows, plants are looked for beside those alone; with a noise, under
         that alone.
@@ -118,10 +116,8 @@ class Question(ReadOnlyArrays):
             largest_delay=self.largest_delay,
             plant=self.plant,
             integrating=self.integrates,
-            level=level,
             noise=noise,
             causes=self.causes,
-            omega=tuple(omega),
             progress=progress,
             known=known,
         )

@@ -29,7 +29,6 @@ from deadtime.estimation.data._simulated import moves_between_rows
 from deadtime.estimation.evidence._candidate import CLEAR, PlantCandidate, candidate_of
 from deadtime.estimation.evidence._find import is_outside
 from deadtime.estimation.evidence._question import PLANTS, Question, question_of
-from deadtime.estimation.evidence._screen import may_have_rivals
 from deadtime.estimation.methods._method import Method, Run
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.loops import PAIR, FactoredPlant, FirstOrder, Integrator, P, Plant
@@ -45,7 +44,7 @@ def beside_rivals(fit: DelayEstimate, run: Run, method: Method) -> DelayEstimate
     kind, question = kind_of(fit.loop.plant, fit.free), _question(run)
     if kind is None or question is None:
         return fit
-    if not may_have_rivals(fit, question):
+    if not _may_have_rivals(fit, question):
         return fit
     # The commands as they are in the estimate. Under white noise alone leads are larger.
     straight = moves_between_rows(run.recording, run.loop)
@@ -92,6 +91,29 @@ def kind_of(plant: Plant, free: Sequence[str]) -> str | None:
         if name in PLANTS:
             return name
     return None
+
+
+def _may_have_rivals(fit: DelayEstimate, question: Question) -> bool:
+    """Whether the command behind lags and delays explains what a fit leaves, beyond chance.
+
+    What least squares leaves of a plant that lacks something has no noise to compare with.
+    """
+    plant, noise = fit.loop.plant, None
+    if isinstance(fit._profile, native.FlightProfile):
+        noise = fit._profile.fit.numbers.noise[0]
+    elif fit.verdict == "indication":
+        return True
+    rows, time = question.recording.time, fit.recording.time
+    known = np.isfinite(fit.residuals)
+    known &= (time >= rows[question.earlier]) & (time <= rows[-1])
+    return native.follows_command(
+        (rows, question.command - question.command[0]),
+        (time[known], fit.residuals[known], fit.recording.sample_time),
+        (fit.delay, fit.lag or 0.0),
+        plant._polynomials({**plant.parameters, "gain": 1.0}),
+        noise,
+        CLEAR,
+    )
 
 
 def _question(run: Run) -> Question | None:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from deadtime._base.arrays import Array
-from deadtime.estimation._native import LEVEL_OF_TESTS, fit_covariance, whiteness
+from deadtime.estimation._native import LEVEL_OF_TESTS, whiteness
 
 
 @dataclass(frozen=True)
@@ -60,18 +60,3 @@ def whiteness_of(
 def pieces_of(values: Array, sizes: Sequence[int] | None) -> list[Array]:
     """Rows that belong to recordings of these sizes."""
     return [values] if sizes is None else np.split(values, np.cumsum(sizes)[:-1])
-
-
-def white_covariance(jacobian: Array, residuals: Array) -> Array:
-    """Covariance of the parameters for white residuals, ``σ² (JᵀJ)⁻¹``."""
-    return fit_covariance(jacobian, residuals, None, True)
-
-
-def robust_covariance(
-    jacobian: Array, residuals: Array, sizes: Sequence[int] | None = None
-) -> Array:
-    """Covariance of the parameters that is also valid for autocorrelated residuals.
-
-    Recordings, of these `sizes`, are independent of each other.
-    """
-    return fit_covariance(jacobian, residuals, sizes, False)

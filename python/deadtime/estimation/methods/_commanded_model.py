@@ -21,13 +21,12 @@ import deadtime.estimation._native as native
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation.data._checks import check_moves
-from deadtime.estimation.data._known_filter import KnownFilter, before_filter
+from deadtime.estimation.data._known_filter import before_filter
 from deadtime.estimation.data._simulated import commands_of, limited
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, place_of
 from deadtime.estimation.likelihood._plant import behind_limits, plant_model
 from deadtime.estimation.methods._method import Run
 from deadtime.loops import FirstOrder, Integrator, P, Plant, RateLimited
-from deadtime.recordings import RecordingCheck
 
 #: Names of the limits of the rate of a command.
 RATE_LIMITS = ("rate", "rate_of_rate")
@@ -50,7 +49,7 @@ class Assumed(NamedTuple):
 
     initial_output: float | None = None
     computed: bool = False
-    output_filter: KnownFilter | None = None
+    output_filter: native.KnownFilter | None = None
     air: Literal["command", "vehicle"] = "command"
     intervals: Literal["all", "sum"] = "all"
     complete: bool = False
@@ -64,21 +63,9 @@ class CommandedModel(ModelOfOne):
     known: Mapping[str, float]
     source: str
     commands: native.HeldCommands
+    rows: native.FlightRows
+    repeated: list[int]
     start: Array
-
-    def rows(self, initial_output: float | None, check: RecordingCheck | None) -> native.FlightRows:
-        """The rows for the likelihood, without repeated rows."""
-        data, repeated = self.recording, [] if check is None else check.repeated.tolist()
-        rows = native.FlightRows.read(
-            data.time, data.output, repeated, self.commands, initial_output
-        )
-        if rows.rounding and rows.count < _fewest(self.names):
-            raise NotIdentifiableError(
-                f"the output, rounded to {rows.rounding:g}, moves over only {rows.count} such "
-                f"steps, too few to fit {len(self.names)} parameters and an initial output. "
-                "Widen the window, or choose one in which the output moves more"
-            )
-        return rows
 
     def limited(self, rows: native.FlightRows, values: Mapping[str, float]) -> native.FlightRows:
         """The rows with the command that the plant gets within these limits of its rate."""
@@ -182,6 +169,14 @@ def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> Comma
             "missing. A plant that limits the rate of its command depends on every command. "
             "Choose a window without missing rows"
         )
+    repeated = [] if run.check is None or known is not None else run.check.repeated.tolist()
+    read = native.FlightRows.read(data.time, data.output, repeated, commands, initial_output)
+    if read.rounding and read.count < _fewest(names):
+        raise NotIdentifiableError(
+            f"the output, rounded to {read.rounding:g}, moves over only {read.count} such "
+            f"steps, too few to fit {len(names)} parameters and an initial output. "
+            "Widen the window, or choose one in which the output moves more"
+        )
     return CommandedModel(
         recording=data,
         names=names,
@@ -190,6 +185,8 @@ def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> Comma
         known={"delay": 0.0, "gain": 1.0, **loop.parameters},
         source=source,
         commands=commands,
+        rows=read,
+        repeated=repeated,
         start=np.empty(0),
     )
 

@@ -15,7 +15,6 @@ drift cancels to first order; the standard error is that of the mean of these cy
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 from typing import ClassVar
@@ -23,7 +22,7 @@ from typing import ClassVar
 import numpy as np
 
 import deadtime.estimation._native as native
-from deadtime._base.arrays import Array, Indices
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
 from deadtime.estimation.data._checks import integrator_of
@@ -94,12 +93,14 @@ class Relay(OfOne):
                 f"lag and hold explain a quarter of the period, {0.5 * half:.3g} s. Either "
                 f"the lag is shorter than the given {plant.lag:g} s, or there is no delay"
             )
-        rows, path, output = _path(data, switches, delay, plant.lag)
-        first, last = data.time[rows[[0, -1]]]
-        fitted = float(path @ output) / float(path @ path)
+        columns = data.time, data.output, data.reference
+        found = native.cycle_path(columns, switches, delay, plant.lag)
+        assert found is not None  # there are rows between the first and the last crossing
+        ends, path, output, fitted = found
+        first, last = data.time[ends].tolist()
         slope = abs(plant.gain) * height if height is not None else abs(fitted)
         waits = float(np.mean(switches - crossings[:-1]))
-        peaks = _peaks(data.time, error, crossings)
+        peaks = native.cycle_peaks(data.time, error, crossings)
         return Read(
             {"delay": delay},
             stderr,
@@ -122,7 +123,7 @@ class Relay(OfOne):
                 "amplitude_expected": slope * (delay + waits),
                 "slope": abs(fitted),
             },
-            recording=data.window(float(first), float(last)),
+            recording=data.window(first, last),
             residuals=output - math.copysign(slope, fitted) * path,
         )
 
@@ -160,20 +161,12 @@ def _check_cycle(crossings: Array, error: Array, time: Array) -> None:
             f"{float(halves.min()):.3g} to {float(halves.max()):.3g} s. This is noise or a "
             "changing reference, not a limit cycle"
         )
-    peaks = _peaks(time, error, crossings)
+    peaks = native.cycle_peaks(time, error, crossings)
     if peaks[-1] < SHRINKING * peaks[0]:
         raise NotIdentifiableError(
             f"the oscillation decays from {peaks[0]:.3g} to {peaks[-1]:.3g}, so it is not "
             "sustained by a relay: use method='decrement' or 'waveform'"
         )
-
-
-def _peaks(time: Array, error: Array, crossings: Array) -> Array:
-    """Largest error between each crossing and the next."""
-    rows = np.searchsorted(time, crossings)
-    return np.array(
-        [float(np.max(np.abs(error[low:high]))) for low, high in itertools.pairwise(rows)]
-    )
 
 
 def _switches(time: Array, signs: Array, crossings: Array, sampled: bool) -> Array:
@@ -189,20 +182,3 @@ def _switches(time: Array, signs: Array, crossings: Array, sampled: bool) -> Arr
                 "Use a larger relay"
             )
     return np.array(times)
-
-
-def _path(
-    data: Recording, switches: Array, delay: float, lag: float
-) -> tuple[Indices, Array, Array]:
-    """Rows from the second switch on; the unit path caused by the switches, and the output there.
-
-    Path and output are about their means.
-    """
-    begin, end = switches[1] + delay, switches[-1] + delay
-    rows = np.flatnonzero((data.time >= begin) & (data.time <= end))
-    first = -1.0 if data.output[rows[0]] > data.reference[rows[0]] else 1.0
-    values = np.full(switches.size, first)
-    values[::2] = -first
-    path = native.HeldResponse(switches, values).at(data.time[rows] - delay, lag).value
-    output = data.output[rows]
-    return rows, path - path.mean(), output - output.mean()
