@@ -1,10 +1,8 @@
-"""Test of residuals for whiteness, and the covariance of a fit for white and coloured ones.
+"""Test of residuals for whiteness.
 
 Least squares gives the covariance ``σ² (JᵀJ)⁻¹`` only for residuals that are white. Coloured
 ones (an incomplete model, sensor noise that the controller acts on) carry less information than
-their number suggests; the sandwich ``(JᵀJ)⁻¹ S (JᵀJ)⁻¹`` with Newey and
-West's (1987) long-run covariance S of the scores ``J_t e_t`` stays valid for them. Its
-bandwidth is Andrews' (1991, eq. 6.2 and 6.4) plug-in for the Bartlett kernel.
+their number suggests. The kernel has both covariances (`least_squares/covariance.rs`).
 """
 
 from __future__ import annotations
