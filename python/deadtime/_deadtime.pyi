@@ -1022,7 +1022,7 @@ def interval_end(
     tolerance: float,
 ) -> float: ...
 def shared_number(
-    sum: Callable[[float], float],
+    total: Callable[[float], float],
     ends: _Pair,
     steps: int,
     rise: float,

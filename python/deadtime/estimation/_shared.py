@@ -19,6 +19,7 @@ from typing import Any
 import deadtime.estimation._native as native
 from deadtime._base.digits import between, shown
 from deadtime._base.plain import plain_fields
+from deadtime._base.validation import confidence
 from deadtime._base.verdicts import Verdict, claimed, verdict_if
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.fit._profile import floor_of, unit_of
@@ -145,8 +146,7 @@ def shared_number(
         raise ValueError(
             f"{len(estimates)} estimates were given: a shared number needs two or more"
         )
-    if not 0.0 < level < 1.0:
-        raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
+    confidence(level)
     ends = [one.ci(level, name) for one in estimates]
     values = [one._value(name) for one in estimates]
 

@@ -39,16 +39,16 @@ pub(crate) fn interval_end(
 /// on a grid of so many steps, all to a tolerance.
 #[pyfunction]
 pub(crate) fn shared_number(
-    sum: &Bound<'_, PyAny>,
+    total: &Bound<'_, PyAny>,
     ends: (f64, f64),
     steps: usize,
     rise: f64,
     floor: f64,
     tolerance: f64,
 ) -> PyResult<(f64, f64, (f64, f64))> {
-    let calls = Calls::new(sum.py());
+    let calls = Calls::new(total.py());
     let found = run_attached(calls.py, |task| {
-        let sum = |place: f64| calls.kept(sum.call1((place,)).and_then(|x| x.extract()));
+        let sum = |place: f64| calls.kept(total.call1((place,)).and_then(|x| x.extract()));
         shared(sum, ends, steps, (rise, floor, tolerance), task)
     });
     let found = calls.ended(found)?;

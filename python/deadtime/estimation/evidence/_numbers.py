@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 import deadtime.estimation._native as native
 from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.validation import one_dimensional
+from deadtime._base.validation import confidence, one_dimensional
 from deadtime._base.verdicts import Verdict
 from deadtime.estimation.evidence._candidate import CLEAR, PlantCandidate, plant_of
 from deadtime.estimation.evidence._causes import Cause, SensorFault
@@ -214,8 +214,7 @@ class FoundPlant(AtCrossover, ReadOnlyArrays):
 
     def _check(self, level: float, name: str) -> None:
         """Refuse an interval that there is not."""
-        if not 0.0 < level < 1.0:
-            raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
+        confidence(level)
         if self.verdict == "none":
             raise ValueError(f"no interval: {self.reason}")
         if name not in self.intervals:

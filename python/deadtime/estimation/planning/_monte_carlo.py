@@ -20,7 +20,7 @@ from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.processes import shared_out
 from deadtime._base.progress import Progress
-from deadtime._base.validation import whole_number
+from deadtime._base.validation import confidence, whole_number
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.fit._profile import unit_of
 from deadtime.loops import ControlLoop
@@ -154,8 +154,7 @@ class Trials(NamedTuple):
     def run(self, method: str, runs: int, processes: int | None, progress: Progress) -> MonteCarlo:
         """Simulate and estimate `runs` times, and collect the statistics."""
         count = whole_number("runs", runs)
-        if not 0.0 < self.level < 1.0:
-            raise ValueError(f"level={self.level!r} is not between 0 and 1: 0.95 is usual")
+        confidence(self.level)
         return _summed_up(method, self, shared_out(self.outcomes, count, processes, progress))
 
 
