@@ -1021,6 +1021,10 @@ def interval_end(
     farthest: float,
     tolerance: float,
 ) -> float: ...
+def most_moved(values: _Reals, count: int) -> int: ...
+def secant_ends(
+    moved: Callable[[list[float]], Sequence[float]], cov: _Reals, reach: float
+) -> list[_Reals]: ...
 def shared_number(
     total: Callable[[float], float],
     ends: _Pair,

@@ -187,17 +187,14 @@ class Felt(AtCrossover):
         if not np.all(np.isfinite(self.cov)):
             unknown = np.full_like(middle, math.nan)
             return unknown, unknown
-        values, vectors = np.linalg.eigh(self.cov)
-        axes = self.quantile(level) * vectors * np.sqrt(np.maximum(values, 0.0))
-        below, above = np.zeros_like(middle), np.zeros_like(middle)
-        for axis in axes.T:
-            steps = (dict(zip(self.free, step.tolist(), strict=True)) for step in (axis, -axis))
-            moved = np.array([of(_moved(self.loop, step)) for step in steps])
-            # Where no gain is largest beside one that is, the interval is open.
-            changes = np.where(np.isnan(moved), math.inf, moved - middle)
-            below += np.minimum(changes.min(axis=0), 0.0) ** 2
-            above += np.maximum(changes.max(axis=0), 0.0) ** 2
-        return middle - np.sqrt(below), middle + np.sqrt(above)
+
+        def moved(step: list[float]) -> list[float]:
+            loop = _moved(self.loop, dict(zip(self.free, step, strict=True)))
+            return np.ravel(of(loop) - middle).tolist()
+
+        # Where no gain is largest beside one that is, the interval is open.
+        below, above = native.secant_ends(moved, self.cov, self.quantile(level))
+        return middle - below.reshape(middle.shape), middle + above.reshape(middle.shape)
 
 
 def _moved(loop: ControlLoop, steps: Mapping[str, float]) -> ControlLoop:

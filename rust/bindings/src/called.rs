@@ -2,11 +2,12 @@
 
 use deadtime::estimation::{
     EndSearch, MixturePart, interval_end as end, mixture_interval as mixture,
-    shared_number as shared,
+    secant_ends as secants, shared_number as shared,
 };
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
-use crate::arrays::converted;
+use crate::arrays::{converted, owned};
 use crate::calls::Calls;
 use crate::runtime::run_attached;
 
@@ -73,4 +74,24 @@ pub(crate) fn mixture_interval(
         });
     let parts: Vec<MixturePart> = parts.collect();
     converted(mixture(&parts, level, ends, tolerance))
+}
+
+/// How far the lower and upper ends of quantities are from their values, from a covariance of numbers and a
+/// quantile; `moved` has the change of each quantity by steps of the numbers.
+#[pyfunction]
+pub(crate) fn secant_ends<'py>(
+    moved: &Bound<'py, PyAny>,
+    cov: PyReadonlyArrayDyn<'py, f64>,
+    reach: f64,
+) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
+    let (calls, cov) = (Calls::new(moved.py()), owned(&cov)?);
+    let found = run_attached(calls.py, |_| {
+        let moved = |step: &[f64]| {
+            let found = moved.call1((step.to_vec(),)).and_then(|x| x.extract());
+            calls.kept(found)
+        };
+        secants(moved, &cov, reach)
+    });
+    let (below, above) = calls.ended(found)?;
+    Ok([below, above].map(|one| one.into_pyarray(calls.py)))
 }

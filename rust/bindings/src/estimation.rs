@@ -3,7 +3,7 @@
 use deadtime::estimation::{
     Disturbance, Entry, Evaluation, Fit, HeldPath, Left, Noise, Plant, Point, Timing,
     coarse_step as coarse, felt, follows_command as follows, held_response as response,
-    regular_times as regular, statistics, whiten,
+    most_moved as most, regular_times as regular, statistics, whiten,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
@@ -317,4 +317,10 @@ pub(crate) fn regular_times<'py>(
 #[pyfunction]
 pub(crate) fn coarse_step(output: Floats<'_>, noise: f64) -> PyResult<f64> {
     Ok(coarse(&owned(&output)?, noise))
+}
+
+/// The first of so many neighbouring rows in which values change most.
+#[pyfunction]
+pub(crate) fn most_moved(values: Floats<'_>, count: usize) -> PyResult<usize> {
+    Ok(most(&owned(&values)?, count))
 }

@@ -49,7 +49,7 @@ mod _deadtime {
         stability_radius,
     };
     #[pymodule_export]
-    use super::called::{interval_end, mixture_interval, shared_number};
+    use super::called::{interval_end, mixture_interval, secant_ends, shared_number};
     #[pymodule_export]
     use super::certificate::{Certificate, Contour, Monotone, Segment};
     #[pymodule_export]
@@ -63,7 +63,7 @@ mod _deadtime {
     #[pymodule_export]
     use super::estimation::{
         PlantNumbers, RowLikelihood, RowNoise, coarse_step, felt_plant, follows_command,
-        held_response, independent_samples, regular_times, whitened_columns,
+        held_response, independent_samples, most_moved, regular_times, whitened_columns,
     };
     #[pymodule_export]
     use super::family::{FamilyCandidate, FamilyFit, fit_family};

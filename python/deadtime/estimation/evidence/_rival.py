@@ -141,11 +141,8 @@ def _most_excited(run: Run) -> tuple[Recording, OpenRange]:
     if rows.stop - rows.start <= MOST_ROWS:
         return run.recording, run.window
     command = run.recording.command
-    moves = np.abs(np.diff(run.recording.reference if command is None else command))
-    moves = moves[rows.start : rows.stop - 1]
-    total = np.concatenate([[0.0], np.cumsum(moves)])
-    within = MOST_ROWS - 1
-    first = rows.start + int(np.argmax(total[within:] - total[:-within]))
+    moving = run.recording.reference if command is None else command
+    first = rows.start + native.most_moved(moving[rows], MOST_ROWS)
     time = run.recording.time
     window = float(time[first]), float(time[first + MOST_ROWS - 1])
     return run.recording.window(float(time[max(0, first - MOST_ROWS)]), window[1]), window

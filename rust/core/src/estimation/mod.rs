@@ -90,9 +90,10 @@ pub use plant::Plant;
 pub use point::{Point, Quantity, Timing};
 pub use profile::Limits;
 pub use rows::{Commands, Rows};
-pub use screen::{Left, follows_command};
+pub use screen::{Left, follows_command, most_moved};
 pub use shared::{
-    Part as MixturePart, Search as EndSearch, Shared, interval_end, mixture_interval, shared_number,
+    Part as MixturePart, Search as EndSearch, Shared, interval_end, mixture_interval, secant_ends,
+    shared_number,
 };
 pub use stamps::regular_times;
 pub use variables::Free;

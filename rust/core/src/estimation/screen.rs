@@ -76,6 +76,27 @@ pub fn follows_command(
     Ok(gained(&white, own).0 > beyond)
 }
 
+/// The first of so many neighbouring rows in which values change most.
+pub fn most_moved(values: &[f64], count: usize) -> usize {
+    let mut totals = vec![0.0];
+    for pair in values.windows(2) {
+        totals.push(totals[totals.len() - 1] + (pair[1] - pair[0]).abs());
+    }
+    let within = count.saturating_sub(1);
+    let sums = totals
+        .iter()
+        .skip(within)
+        .zip(&totals)
+        .map(|(last, first)| last - first);
+    let mut best = (0, f64::NEG_INFINITY);
+    for (row, sum) in sums.enumerate() {
+        if sum > best.1 {
+            best = (row, sum);
+        }
+    }
+    best.0
+}
+
 /// The residuals, what their own plant may explain of them, and what others may.
 fn columns_of(path: &HeldPath, left: Left<'_>) -> Vec<Vec<f64>> {
     let time = left.time;
@@ -147,6 +168,12 @@ mod tests {
         };
         let plant = Plant::new(&[1.0], &[1.0, 0.0]).unwrap();
         follows_command(&path, left, &plant, None, 10.0, &Task::new()).unwrap()
+    }
+
+    #[test]
+    fn the_rows_that_move_most_are_found() {
+        assert_eq!(most_moved(&[0.0, 0.0, 1.0, 0.0, 0.0, 0.5], 3), 1);
+        assert_eq!(most_moved(&[1.0], 3), 0);
     }
 
     #[test]

@@ -6,6 +6,7 @@
 
 use super::statistics::normal_beyond;
 use crate::between::{minimum, zero};
+use crate::linear_algebra::symmetric::Symmetric;
 use crate::{Error, Task};
 
 /// Most evaluations of a search for the minimum.
@@ -179,9 +180,62 @@ pub fn mixture_interval(
     Ok((end(0.5 - 0.5 * level)?, end(0.5 + 0.5 * level)?))
 }
 
+/// Lower and upper ends of quantities of numbers with a covariance: each from the moves of `reach` deviations
+/// along its axes that lead there. `moved` has the change of each quantity by steps of the numbers.
+///
+/// # Errors
+///
+/// Those of `moved`.
+pub fn secant_ends(
+    mut moved: impl FnMut(&[f64]) -> Result<Vec<f64>, Error>,
+    cov: &[f64],
+    reach: f64,
+) -> Result<(Vec<f64>, Vec<f64>), Error> {
+    let n = cov.len().isqrt();
+    let Symmetric { values, vectors } = Symmetric::new(cov, n);
+    let (mut below, mut above) = (Vec::new(), Vec::new());
+    for (value, vector) in values.iter().zip(&vectors) {
+        let size = reach * value.max(0.0).sqrt();
+        let mut each = Vec::new();
+        for sign in [size, -size] {
+            let step: Vec<f64> = vector.iter().map(|x| sign * x).collect();
+            each.push(moved(&step)?);
+        }
+        let count = each[0].len();
+        below.resize(count, 0.0_f64);
+        above.resize(count, 0.0_f64);
+        for i in 0..count {
+            // Where there is no value beside one that is, the interval is open.
+            let changes = each.iter().map(|one| {
+                if one[i].is_nan() {
+                    f64::INFINITY
+                } else {
+                    one[i]
+                }
+            });
+            let (least, most) = changes.fold((0.0_f64, 0.0_f64), |(low, high), change| {
+                (low.min(change), high.max(change))
+            });
+            below[i] += least * least;
+            above[i] += most * most;
+        }
+    }
+    let root = |squares: Vec<f64>| squares.into_iter().map(f64::sqrt).collect();
+    Ok((root(below), root(above)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn ends_of_a_line_are_those_of_the_delta_method() {
+        // 2 x + y with standard errors of 1 and 2 and a correlation of a half: √(4 + 4 + 4).
+        let line = |step: &[f64]| Ok(vec![2.0 * step[0] + step[1]]);
+        let (below, above) = secant_ends(line, &[1.0, 1.0, 1.0, 4.0], 1.0).unwrap();
+        assert!((below[0] - 12.0_f64.sqrt()).abs() < 1e-12);
+        assert!((above[0] - 12.0_f64.sqrt()).abs() < 1e-12);
+    }
 
     #[test]
     fn a_mixture_of_one_has_its_own_interval() {
