@@ -20,7 +20,8 @@ from deadtime.estimation import (
     Waveform,
 )
 from deadtime.estimation._estimate import METHODS
-from deadtime.estimation.fit._residuals import robust_covariance, white_covariance, whiteness_of
+from deadtime.estimation._native import LeastSquaresMinimum
+from deadtime.estimation.fit._residuals import whiteness_of
 from deadtime.estimation.methods._overshoot import dominant_x, exact_x
 from hypothesis import given, settings, strategies as st
 from scipy.signal import lfilter
@@ -425,6 +426,13 @@ def test_white_residuals_are_rejected_at_the_stated_rate():
     assert rejected <= 18
 
 
+def errors_of_a_mean(residuals):
+    """The standard errors of a mean with these residuals, as white ones and as coloured ones."""
+    n = residuals.size
+    found = LeastSquaresMinimum(np.zeros(1), residuals, np.ones((n, 1)))
+    return [math.sqrt(cov[0, 0]) for cov in found.spreads([0], [n])]
+
+
 def test_robust_standard_errors_are_right_for_coloured_noise_and_white_ones_are_not():
     # Mean of an AR(1) process: its standard deviation is known, sigma sqrt((1+rho)/(1-rho)/n).
     rng = np.random.default_rng(2)
@@ -435,9 +443,7 @@ def test_robust_standard_errors_are_right_for_coloured_noise_and_white_ones_are_
         process[k] = rho * process[k - 1] + noise[k]
     residuals = process[200:] - process[200:].mean()
     truth = math.sqrt(1 / (1 - rho) ** 2 / n)
-    ones = np.ones((n, 1))
-    robust = math.sqrt(robust_covariance(ones, residuals)[0, 0])
-    white = math.sqrt(white_covariance(ones, residuals)[0, 0])
+    white, robust = errors_of_a_mean(residuals)
     assert robust == pytest.approx(truth, rel=0.25)
     assert white < 0.6 * truth
 
@@ -447,8 +453,7 @@ def test_the_bandwidth_grows_with_the_correlation():
     rng = np.random.default_rng(3)
     n, rho = 500, 0.9
     processes = lfilter([1.0], [1.0, -rho], rng.normal(size=(60, n + 200)))[:, 200:]
-    ones = np.ones((n, 1))
-    found = [robust_covariance(ones, one - one.mean())[0, 0] for one in processes]
+    found = [errors_of_a_mean(one - one.mean())[1] ** 2 for one in processes]
     assert np.mean(found) * n * (1 - rho) ** 2 == pytest.approx(0.7, abs=0.12)
 
 

@@ -6,7 +6,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import OutputError
-from deadtime.estimation.data._known_filter import KnownFilter
+from deadtime.estimation.data._known_filter import known_filter
 from hypothesis import given, strategies as st
 from marks import NIGHTLY
 from scipy import signal
@@ -59,7 +59,7 @@ def test_with_hardly_any_noise_the_filter_takes_no_part(known, noise):
     assert found.gain == pytest.approx(GAIN, rel=1e-3)
     # The filter is a part of the delay where it is not told.
     whole = estimate(recording, ([1.0], [1.0]))
-    late = KnownFilter.of(known).late / RATE
+    late = known_filter(known).late / RATE
     assert whole.delay_plus_lag - found.delay_plus_lag == pytest.approx(late, abs=3e-4)
 
 
@@ -76,7 +76,7 @@ def test_filtered_noise_and_torques_are_told_from_the_vehicle(known):
 def test_noise_behind_the_filter_leaves_what_is_computed_nearly_white():
     # Noise of the sensor, and a tenth as much added behind the filter, as by digits.
     random = np.random.default_rng(1)
-    known = KnownFilter.of(BIQUAD)
+    known = known_filter(BIQUAD)
     output = signal.lfilter(*BIQUAD, random.standard_normal(200_000))
     output += 0.1 * np.std(output) * random.standard_normal(output.size)
     before = known.undone(output)[known.start :]
@@ -89,7 +89,7 @@ def test_noise_behind_the_filter_leaves_what_is_computed_nearly_white():
 @given(st.floats(0.05, 0.95))
 def test_a_first_order_filter_is_undone_exactly(k):
     x = np.random.default_rng(1).standard_normal(300)
-    known = KnownFilter.of(([k], [1.0, k - 1.0]))
+    known = known_filter(([k], [1.0, k - 1.0]))
     undone = known.undone(signal.lfilter([k], [1.0, k - 1.0], x))
     np.testing.assert_allclose(undone[1:], x[1:], rtol=0, atol=1e-9)
     assert known.late == pytest.approx((1.0 - k) / k)

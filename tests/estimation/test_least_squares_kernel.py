@@ -70,7 +70,7 @@ def test_derivatives_of_a_simulated_loop_are_its_difference_quotients(
     run = Run(recorded(truth), truth)
     model = simulated_model(run, ("delay", "gain", "lag", "start"))
     point = np.array([delay + 1.23e-3, gain, lag, start, 0.03])
-    slopes, step = model.jacobian(point), 1e-6
+    slopes, step = model.problem.jacobian(point), 1e-6
     for column, change in zip(slopes.T, step * np.eye(5), strict=True):
         upper, lower = model.misfit(point + change), model.misfit(point - change)
         quotient = (upper - lower) / (2.0 * step)
@@ -89,7 +89,7 @@ def test_a_loop_that_cannot_be_simulated_has_the_largest_misfit_and_no_slope():
         Run(dtm.Recording(long, recording.reference, 0.01 * np.sin(long)), truth), ("delay", "gain")
     )
     point = np.array([0.5, 900.0, 0.0])
-    misfit, slopes = diverging.misfit(point), diverging.jacobian(point)
+    misfit, slopes = diverging.misfit(point), diverging.problem.jacobian(point)
     assert np.max(np.abs(misfit)) == 1e3 * diverging.size
     assert np.all(slopes[np.abs(misfit) >= 1e3 * diverging.size] == 0.0)
 

@@ -86,7 +86,7 @@ def test_the_joint_model_consists_of_the_models_of_its_recordings():
     np.testing.assert_array_equal(joint.misfit(point), expected)
     change = 1e-6 * np.eye(4)
     quotients = [(joint.misfit(point + d) - joint.misfit(point - d)) / 2e-6 for d in change]
-    np.testing.assert_allclose(joint.jacobian(point).T, quotients, atol=2e-5)
+    np.testing.assert_allclose(joint.problem.jacobian(point).T, quotients, atol=2e-5)
 
 
 @pytest.mark.parametrize(

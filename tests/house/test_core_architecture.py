@@ -161,7 +161,13 @@ ORDER = {
         "range",
     ],
     "estimation": [
+        "columns",
         "statistics",
+        "shared",
+        "stamps",
+        "polynomial",
+        "felt",
+        "known_filter",
         "plant",
         "disturbance",
         "rows",
@@ -188,6 +194,7 @@ ORDER = {
         "family",
         "least_squares",
         "literature",
+        "screen",
         "commanded",
     ],
 }

@@ -68,6 +68,13 @@ def positive(name: str, value: SupportsFloat) -> float:
     return number
 
 
+def confidence(level: float) -> float:
+    """Return the level of an interval, which is between 0 and 1, or raise."""
+    if not 0.0 < level < 1.0:
+        raise ValueError(f"level={level!r} is not between 0 and 1: give a level such as 0.95")
+    return level
+
+
 def non_zero(name: str, value: SupportsFloat, reason: str) -> float:
     """Return `value` as a float other than zero, or raise with the `reason` why it cannot be."""
     number = finite(name, value)

@@ -8,10 +8,10 @@ while the loop runs. Each method is a class that holds its options.
 
 # The files. `_estimate` chooses and runs a method, `_compare` runs several, `_choose` tries several
 # plants, `_result` is what they return, `_shared` combines several. `evidence` finds the plant of a
-# recording without a loop. `methods` holds one file a
-# method, `data` what they read from a recording, `models` what they fit, `fit` least squares,
-# profiles and residuals, `planning` the bounds of planned experiments, `running` what is
-# estimated while a loop runs.
+# recording without a loop. `methods` holds one file a method, `data` what they read from a
+# recording, `fit` least squares, profiles and residuals, `likelihood` plant and noise as the kernel
+# takes them, `planning` the bounds of planned experiments, `running` what is estimated while a loop
+# runs.
 
 from deadtime.estimation._choose import (
     PLANT_COLUMNS as PLANT_COLUMNS,

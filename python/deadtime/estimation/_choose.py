@@ -17,13 +17,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
-import numpy as np
-
 from deadtime._base.digits import between
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.verdicts import Verdict
 from deadtime.estimation._estimate import estimate_delay, method_of
+from deadtime.estimation._native import mixture_interval
 from deadtime.estimation._result import DelayEstimate, bic
 from deadtime.estimation.methods._method import Loops, Method, Recordings, Windows, paired_runs
 from deadtime.estimation.methods._output_error import OutputError
@@ -43,8 +42,9 @@ ALIKE, DAMPING = 0.7, 0.7
 #: Headings of the table.
 PLANT_COLUMNS = ("plant", "BIC", "white", "verdict", "delay", "lag", "sum", "95 % interval")
 
-#: Points of the distribution of delay and lag together, and the least weight of a plant in it.
-PLACES, LEAST = 4001, 1e-3
+#: The part of its range to which an interval of delay and lag together is found, and the least
+#: weight of a plant in it.
+PLACES, LEAST = 4e6, 1e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -107,15 +107,12 @@ class PlantChoice(ReadOnlyArrays):
         weights = {name: weight for name, weight in self.weights.items() if weight > LEAST}
         fits = {name: self.estimates[name] for name in weights}
         ends = [fit.ci(level, "delay+lag") for fit in fits.values()]
-        places = np.linspace(min(low for low, _ in ends), max(high for _, high in ends), PLACES)
-        below = np.zeros(PLACES)
-        for name, fit in fits.items():
-            middle = fit.delay_plus_lag
-            low, high = fit.ci(one, "delay+lag")
-            sizes = np.maximum(np.where(places < middle, middle - low, high - middle), 1e-12)
-            below += weights[name] / sum(weights.values()) * special.ndtr((places - middle) / sizes)
-        low, high = np.interp([0.5 - level / 2, 0.5 + level / 2], below, places)
-        return float(low), float(high)
+        low, high = min(low for low, _ in ends), max(high for _, high in ends)
+        parts = [
+            (weight / sum(weights.values()), fit.delay_plus_lag, *fit.ci(one, "delay+lag"))
+            for weight, fit in zip(weights.values(), fits.values(), strict=True)
+        ]
+        return mixture_interval(parts, level, (low, high), (high - low) / PLACES)
 
     def rows(self) -> list[list[str]]:
         """The plants as cells of a table with the headings `PLANT_COLUMNS`, the likeliest first."""

@@ -14,8 +14,8 @@ from deadtime._base.errors import NotIdentifiableError, RecordingError
 from deadtime._base.validation import OpenRange
 from deadtime.estimation._estimate import METHODS, checked_run
 from deadtime.estimation._findings import bound
+from deadtime.estimation._native import independent_samples
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._checks import independent_samples
 from deadtime.estimation.evidence._rival import beside_rivals
 from deadtime.estimation.methods._method import paired_runs
 from deadtime.estimation.methods._overshoot import Overshoot, OvershootMap
@@ -304,9 +304,7 @@ def _overshoot_against_fit(dominant: DelayEstimate, plain: DelayEstimate, fit: s
 
 
 def compare_methods(
-    recording: Recording,
-    loop: ControlLoop,
-    window: OpenRange | None = None,
+    recording: Recording, loop: ControlLoop, window: OpenRange | None = None
 ) -> Comparison:
     """Estimate the delay of a recording by every method that applies.
 

@@ -275,9 +275,7 @@ def estimate_delay(
             raise ValueError(
                 "method and free are for an estimate with a loop: give the loop, or leave both out"
             )
-        return estimate_by_evidence(
-            recording, window=window, between=between, progress=progress, **known
-        )
+        return estimate_by_evidence(recording, window, {**known, "between": between}, progress)
     given = [name for name, value in known.items() if value is not None]
     if given:
         raise ValueError(

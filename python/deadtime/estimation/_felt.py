@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+import deadtime.estimation._native as native
 from deadtime._base.arrays import Array
-from deadtime._base.validation import one_dimensional
-from deadtime.estimation.evidence._numbers import LoopView
-from deadtime.loops import ControlLoop, Plant
+from deadtime.estimation.evidence._numbers import AtCrossover, LoopView, frequencies
+from deadtime.loops import ControlLoop
 from deadtime.recordings import Columns, Recording
 from deadtime.roots import delay
 
@@ -51,21 +51,11 @@ EXCITED = 1e-3
 LEAST = 1e-3
 
 
-def angle(plant: Plant, late: float, omega: Array) -> Array:
-    """Angle of the plant behind a delay, rad, without jumps; of -G where its gain is negative."""
-    num, den = plant.polynomials()
-    zeros, poles = np.roots(num), np.roots(den)
-    turn = -omega * late - 0.5 * np.pi * np.count_nonzero(poles == 0.0)
-    for roots, sign in ((zeros, 1.0), (poles[poles != 0.0], -1.0)):
-        for root in roots:
-            turn = turn + sign * np.angle(1.0 - 1j * omega / root)
-    return np.asarray(turn)
-
-
-def size(plant: Plant, omega: Array) -> Array:
-    """Size of the plant at frequencies in rad/s."""
-    num, den = plant.polynomials()
-    return np.asarray(np.abs(np.polyval(num, 1j * omega) / np.polyval(den, 1j * omega)))
+def seen(loop: ControlLoop, omega: ArrayLike) -> Array:
+    """Logarithm of the size, angle and equivalent delay of a plant behind its delay, a row each."""
+    num, den = loop.plant.polynomials()
+    places = np.atleast_1d(omega).tolist()
+    return np.array(native.felt_plant(num.tolist(), den.tolist(), loop.delay or 0.0, places))
 
 
 def limits(loop: ControlLoop) -> tuple[float, float]:
@@ -96,7 +86,7 @@ def highest_excited(recording: Recording, loop: ControlLoop) -> float:
     return 2.0 * math.pi * highest / (command.size * recording.sample_time)
 
 
-class Felt:
+class Felt(AtCrossover):
     """What a loop feels of the plant of an estimate: part of `DelayEstimate`."""
 
     if TYPE_CHECKING:
@@ -137,21 +127,6 @@ class Felt:
         loop = self.loop.continuous()
         return float(max(loop.margin().gain_crossovers, default=math.nan))
 
-    @property
-    def gain_at_crossover(self) -> float:
-        """Size of G at `crossover`."""
-        return self._at_crossover["gain_at_crossover"]
-
-    @property
-    def phase_at_crossover(self) -> float:
-        """Angle of G at `crossover`, rad."""
-        return self._at_crossover["phase_at_crossover"]
-
-    @property
-    def delay_at_crossover(self) -> float:
-        """Equivalent delay at `crossover`, s."""
-        return self._at_crossover["delay_at_crossover"]
-
     def at(self, omega: ArrayLike, level: float = 0.95) -> LoopView:
         """Gain, phase and equivalent delay at some frequencies, with intervals.
 
@@ -172,45 +147,25 @@ class Felt:
         ValueError
             If a frequency is not above zero, or the plant limits rates.
         """
-        given = one_dimensional("omega", np.atleast_1d(np.asarray(omega, dtype=float)))
-        bad = given[~(given > 0.0)]
-        if bad.size:
-            raise ValueError(f"omega={bad[0]:g} rad/s: give frequencies above zero")
+        given = frequencies("omega", omega)
         if not self.loop.plant.is_linear:
             raise ValueError(
                 "the plant limits the rate of its command, so the plant is not linear and has "
                 "no gain or phase"
             )
-        turned = _integrators(self.loop.plant) * 0.5 * np.pi
-
-        def seen(loop: ControlLoop) -> Array:
-            phase = angle(loop.plant, loop.delay or 0.0, given)
-            return np.array([np.log(size(loop.plant, given)), phase])
-
-        middle = seen(self.loop)
-        low, high = self._ends(seen, level)
-        ends = np.array([low, high])
-        to_delay = -1.0 / given
+        size, phase, late = seen(self.loop, given)
+        ends = np.array(self._ends(lambda loop: seen(loop, given), level))
         return LoopView(
-            given,
-            np.exp(middle[0]),
-            middle[1],
-            to_delay * (middle[1] + turned),
-            np.exp(ends[:, 0]),
-            ends[:, 1],
-            (to_delay * (ends[:, 1] + turned))[::-1],
+            given, np.exp(size), phase, late, np.exp(ends[:, 0]), ends[:, 1], ends[:, 2]
         )
 
     @cached_property
-    def _at_crossover(self) -> dict[str, float]:
+    def _at_crossover(self) -> tuple[float, float, float]:
         omega = self.crossover
         if not math.isfinite(omega):
-            return dict.fromkeys(FELT[2:], math.nan)
-        place = np.array([omega])
-        phase = float(angle(self.loop.plant, self.loop.delay or 0.0, place)[0])
-        turned = phase + _integrators(self.loop.plant) * 0.5 * math.pi
-        gain = float(size(self.loop.plant, place)[0])
-        return dict(zip(FELT[2:], (gain, phase, -turned / omega), strict=True))
+            return math.nan, math.nan, math.nan
+        size, phase, late = seen(self.loop, omega)[:, 0].tolist()
+        return math.exp(size), phase, late
 
     def _felt_interval(self, level: float, name: str) -> tuple[float, float]:
         """The interval of one of `FELT`."""
@@ -232,23 +187,14 @@ class Felt:
         if not np.all(np.isfinite(self.cov)):
             unknown = np.full_like(middle, math.nan)
             return unknown, unknown
-        values, vectors = np.linalg.eigh(self.cov)
-        axes = self.quantile(level) * vectors * np.sqrt(np.maximum(values, 0.0))
-        below, above = np.zeros_like(middle), np.zeros_like(middle)
-        for axis in axes.T:
-            steps = (dict(zip(self.free, step.tolist(), strict=True)) for step in (axis, -axis))
-            moved = np.array([of(_moved(self.loop, step)) for step in steps])
-            # Where no gain is largest beside one that is, the interval is open.
-            changes = np.where(np.isnan(moved), math.inf, moved - middle)
-            below += np.minimum(changes.min(axis=0), 0.0) ** 2
-            above += np.maximum(changes.max(axis=0), 0.0) ** 2
-        return middle - np.sqrt(below), middle + np.sqrt(above)
 
+        def moved(step: list[float]) -> list[float]:
+            loop = _moved(self.loop, dict(zip(self.free, step, strict=True)))
+            return np.ravel(of(loop) - middle).tolist()
 
-def _integrators(plant: Plant) -> int:
-    """How often the plant integrates."""
-    _, den = plant.polynomials()
-    return int(np.count_nonzero(np.roots(den) == 0.0))
+        # Where no gain is largest beside one that is, the interval is open.
+        below, above = native.secant_ends(moved, self.cov, self.quantile(level))
+        return middle - below.reshape(middle.shape), middle + above.reshape(middle.shape)
 
 
 def _moved(loop: ControlLoop, steps: Mapping[str, float]) -> ControlLoop:

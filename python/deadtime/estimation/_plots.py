@@ -200,8 +200,5 @@ def _draw_ellipse(ax: Axes, plan: Identifiability) -> None:
     name = slow.replace("_", " ")
     ax.set(xlabel="delay (ms)", ylabel=f"{name} (ms)")
     error = 1e3 * plan.bound.stderr[f"delay+{slow}"]
-    ax.set_title(
-        f"95 % of the estimates\ndelay + {name} ± {error:.2g} ms",
-        fontsize="medium",
-    )
+    ax.set_title(f"95 % of the estimates\ndelay + {name} ± {error:.2g} ms", fontsize="medium")
     ax.legend(fontsize="small")

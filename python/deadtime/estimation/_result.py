@@ -15,7 +15,7 @@ from deadtime._base.digits import between, stated
 from deadtime._base.drawing import Axes, Figure, empty_figure
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
-from deadtime._base.validation import non_negative, real_array
+from deadtime._base.validation import confidence, non_negative, real_array
 from deadtime._base.verdicts import NOT_CLAIMED, Verdict, claimed, rough
 from deadtime.estimation._felt import FELT, WORDS, Felt, highest_excited
 from deadtime.estimation._native import FlightProfile
@@ -218,8 +218,7 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
         """
         from scipy import special
 
-        if not 0.0 < level < 1.0:
-            raise ValueError(f"level={level!r} is not between 0 and 1: give a level such as 0.95")
+        confidence(level)
         if not self.calibrated:
             raise ValueError(f"no interval: {self.uncalibrated}")
         if name in FELT:

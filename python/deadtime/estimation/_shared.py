@@ -12,21 +12,20 @@ has S: it is computed on a grid first.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
+import deadtime.estimation._native as native
 from deadtime._base.digits import between, shown
 from deadtime._base.plain import plain_fields
+from deadtime._base.validation import confidence
 from deadtime._base.verdicts import Verdict, claimed, verdict_if
-from deadtime.estimation._native import LEVEL_OF_TESTS
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.fit._profile import floor_of, unit_of
 
-#: Steps of the grid in the smallest interval, and most of them; most steps beyond the grid.
-IN_AN_INTERVAL, ON_THE_GRID, BEYOND = 8, 120, 60
+#: Steps of the grid in the smallest interval, and most of them.
+IN_AN_INTERVAL, ON_THE_GRID = 8, 120
 
 #: Share of the smallest interval to which the minimum and the ends are found.
 TOLERANCE = 1e-3
@@ -65,7 +64,7 @@ class SharedNumber:
     @property
     def agree(self) -> bool:
         """Whether the estimates may share the number."""
-        return self.p_value >= LEVEL_OF_TESTS
+        return self.p_value >= native.LEVEL_OF_TESTS
 
     def summary(self) -> str:
         """The number in one line."""
@@ -85,11 +84,9 @@ class SharedNumber:
         if not self.agree:
             each = ", ".join(shown(one, error, unit) for one in self.estimates)
             return f"{text}. The estimates contradict one another: {each}"
-        return (
-            text
-            if self.verdict == "reliable"
-            else (f"{text}. One of the estimates is only an indication")
-        )
+        if self.verdict != "reliable":
+            text += ". One of the estimates is only an indication"
+        return text
 
     def to_dict(self) -> dict[str, Any]:
         """The number as plain values for JSON."""
@@ -143,66 +140,35 @@ def shared_number(
     >>> both.agree, both.interval[0] < 0.06 < both.interval[1]
     (True, True)
     """
-    from scipy import optimize, special
+    from scipy import special
 
     if len(estimates) < 2:
         raise ValueError(
             f"{len(estimates)} estimates were given: a shared parameter needs two or more"
         )
-    if not 0.0 < level < 1.0:
-        raise ValueError(f"level={level!r} is not between 0 and 1: give a level such as 0.95")
+    confidence(level)
     ends = [one.ci(level, name) for one in estimates]
     values = [one._value(name) for one in estimates]
-    known: dict[float, float] = {}
 
     def total(value: float) -> float:
-        if value not in known:
-            known[value] = math.fsum(
-                float(one.profile(name, [value])[1][0]) ** 2 for one in estimates
-            )
-        return known[value]
+        return math.fsum(float(one.profile(name, [value])[1][0]) ** 2 for one in estimates)
 
     width = min(high - low for low, high in ends)
     low, high = min(low for low, _ in ends), max(high for _, high in ends)
     count = min(ON_THE_GRID, math.ceil(IN_AN_INTERVAL * (high - low) / width))
-    grid = np.linspace(low, high, count + 1).tolist()
-    place = min(range(count + 1), key=lambda k: total(grid[k]))
-    near = grid[max(place - 1, 0)], grid[min(place + 1, count)]
-    found = optimize.minimize_scalar(
-        total, bounds=near, method="bounded", options={"xatol": TOLERANCE * width}
+    rise = float(special.ndtri(0.5 + 0.5 * level)) ** 2
+    best, least, interval = native.shared_number(
+        total, (low, high), count, rise, floor_of(name), TOLERANCE * width
     )
-    best = min((grid[place], float(found.x)), key=total)
-    least = total(best)
-    limit = least + float(special.ndtri(0.5 + 0.5 * level)) ** 2
-
-    inside = [best, *(one for one in grid if total(one) < limit)]
-    step = (high - low) / count
-    edges = ((min(inside), -step), (max(inside), step))
-    interval = [_end(lambda x: total(x) - limit, *edge, floor_of(name)) for edge in edges]
     p_value = float(special.chdtrc(len(estimates) - 1, least))
     return SharedNumber(
         name=name,
         value=best,
-        interval=(interval[0], interval[1]),
+        interval=interval,
         level=level,
         estimates=tuple(values),
         p_value=p_value,
         verdict=verdict_if(
-            p_value >= LEVEL_OF_TESTS and all(one.verdict == "reliable" for one in estimates)
+            p_value >= native.LEVEL_OF_TESTS and all(one.verdict == "reliable" for one in estimates)
         ),
     )
-
-
-def _end(excess: Callable[[float], float], start: float, step: float, floor: float) -> float:
-    """Where the excess, below zero at the start, becomes zero on this side; or the floor."""
-    from scipy import optimize
-
-    near, tolerance = start, TOLERANCE * abs(step)
-    for _ in range(BEYOND):
-        far = max(near + step, floor)
-        if excess(far) >= 0.0:
-            return float(optimize.brentq(excess, near, far, xtol=tolerance))
-        if far == floor:
-            return floor
-        near, step = far, 1.5 * step
-    raise ValueError(f"from {start:.6g} to {near:.6g} no end of the interval was found")

@@ -5,6 +5,7 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn}
 use pyo3::prelude::*;
 
 use crate::arrays::{converted, owned};
+use crate::flight::FlightRows;
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
@@ -77,6 +78,14 @@ impl RoundedReadings {
     fn __getnewargs__(&self) -> (Vec<f64>, Vec<usize>, Vec<bool>, Vec<f64>) {
         let own = self.core.clone();
         (own.output, own.recording, own.used, own.steps)
+    }
+
+    /// The rows of recordings as they were first and as they were fitted, without those that repeat others.
+    #[staticmethod]
+    fn of_rows(first: Vec<FlightRows>, fitted: Vec<FlightRows>, repeated: Vec<Vec<usize>>) -> Self {
+        let core = |rows: Vec<FlightRows>| rows.into_iter().map(|one| one.core).collect::<Vec<_>>();
+        let core = Readings::of_rows(&core(first), &core(fitted), &repeated);
+        Self { core }
     }
 
     /// Number of rows that count.

@@ -1,8 +1,9 @@
 //! Bindings of `deadtime::estimation`.
 
 use deadtime::estimation::{
-    Disturbance, Entry, Evaluation, Fit, Noise, Plant, Point, Timing, held_response as response,
-    whiten,
+    Disturbance, Entry, Evaluation, Fit, HeldPath, Left, Noise, Plant, Point, Timing,
+    coarse_step as coarse, felt, follows_command as follows, held_response as response,
+    most_moved as most, regular_times as regular, statistics, whiten,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
@@ -250,4 +251,76 @@ pub(crate) fn held_response<'py>(
         response(&plant, &input_time, &inputs, &times, task)
     })?;
     Ok(found.into_pyarray(py))
+}
+
+/// Does the command, at its times, explain what a fit leaves of rows beyond chance and a lead in BIC? The
+/// rows are times, residuals and the time between two; `own` is the delay and the lag of the fit.
+#[pyfunction]
+pub(crate) fn follows_command<'py>(
+    py: Python<'py>,
+    command: (Floats<'py>, Floats<'py>),
+    rows: (Floats<'py>, Floats<'py>, f64),
+    own: (f64, f64),
+    plant: (Vec<f64>, Vec<f64>),
+    noise: Option<RowNoise>,
+    lead: f64,
+) -> PyResult<bool> {
+    let plant = converted(Plant::new(&plant.0, &plant.1))?;
+    let path = HeldPath::new(owned(&command.0)?, owned(&command.1)?);
+    let (time, residuals) = (owned(&rows.0)?, owned(&rows.1)?);
+    let left = Left {
+        time: &time,
+        residuals: &residuals,
+        row_time: rows.2,
+        delay: own.0,
+        lag: own.1,
+    };
+    let noise = noise.map(|own| own.noise());
+    run_here(py, |task| {
+        follows(&path, left, &plant, noise.as_ref(), lead, task)
+    })
+}
+
+/// Number of independent samples that hold as much as so many of this lag-1 autocorrelation.
+#[pyfunction]
+pub(crate) fn independent_samples(samples: f64, autocorrelation: f64) -> f64 {
+    statistics::independent_samples(samples, autocorrelation)
+}
+
+/// Logarithm of the size of the plant num/den behind a delay, its angle and its equivalent delay at
+/// frequencies.
+#[pyfunction]
+pub(crate) fn felt_plant<'py>(
+    py: Python<'py>,
+    num: Vec<f64>,
+    den: Vec<f64>,
+    delay: f64,
+    omega: Vec<f64>,
+) -> [Bound<'py, PyArray1<f64>>; 3] {
+    let found = felt(&num, &den, delay, &omega);
+    [found.size, found.angle, found.delay].map(|one| one.into_pyarray(py))
+}
+
+/// The regular times that time stamps scatter around, about so far from each other, if there are some.
+#[pyfunction]
+pub(crate) fn regular_times<'py>(
+    py: Python<'py>,
+    time: Floats<'py>,
+    between: f64,
+) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+    let found = regular(&owned(&time)?, between);
+    Ok(found.map(|own| own.into_pyarray(py)))
+}
+
+/// The step of a sensor that is coarse for how far its output moves, and beside noise of this deviation;
+/// zero of others.
+#[pyfunction]
+pub(crate) fn coarse_step(output: Floats<'_>, noise: f64) -> PyResult<f64> {
+    Ok(coarse(&owned(&output)?, noise))
+}
+
+/// The first of so many neighbouring rows in which values change most.
+#[pyfunction]
+pub(crate) fn most_moved(values: Floats<'_>, count: usize) -> PyResult<usize> {
+    Ok(most(&owned(&values)?, count))
 }

@@ -90,6 +90,23 @@ impl FamilyCandidate {
     }
 }
 
+/// Delay, gain, real time constants, zero, frequency and damping of a pair of poles.
+type PlantParts = (f64, f64, Vec<f64>, f64, Option<(f64, f64)>);
+
+#[pymethods]
+impl FamilyCandidate {
+    /// The numbers of the plant with these values of `names`.
+    fn plant_of(&self, values: Vec<f64>) -> PlantParts {
+        let class = Class {
+            integrating: self.integrating,
+            order: self.order,
+            has_zero: self.has_zero,
+        };
+        let (gain, own) = class.of_values(&values);
+        (own.delay, gain, own.lags(), own.zero, own.pair())
+    }
+}
+
 /// The family of plants fitted to a record.
 #[pyclass(frozen, module = "deadtime._deadtime")]
 pub(crate) struct FamilyFit {
@@ -233,6 +250,28 @@ impl FamilyFit {
             out.set_item(one.name, one.pieces)?;
         }
         Ok(out)
+    }
+
+    /// The numbers of the answer, by the names of an estimate.
+    #[getter]
+    fn shown<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let at = |name: &str| self.value(name);
+        let found = PyDict::new(py);
+        found.set_item("crossover", at("crossover"))?;
+        found.set_item("largest_gain", at("largest_gain"))?;
+        found.set_item("intervals", self.hull(py)?)?;
+        found.set_item("determined", self.told())?;
+        found.set_item("asked", self.asked())?;
+        found.set_item("at_rest", self.at_rest())?;
+        found.set_item("excited", self.excited(py))?;
+        let names = [
+            "gain_at_crossover",
+            "phase_at_crossover",
+            "delay_at_crossover",
+        ];
+        let [gain, phase, delay] = names.map(at);
+        found.set_item("_at_crossover", (gain, phase, delay))?;
+        Ok(found)
     }
 
     #[getter]

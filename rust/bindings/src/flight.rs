@@ -30,7 +30,7 @@ type Ends = Vec<(f64, f64)>;
 #[pyclass(frozen, from_py_object, module = "deadtime._deadtime")]
 #[derive(Clone)]
 pub(crate) struct FlightRows {
-    core: FlightRun,
+    pub(crate) core: FlightRun,
 }
 
 #[pymethods]
@@ -395,9 +395,28 @@ impl FlightFit {
         Ok(values)
     }
 
-    /// Trim of a recording, and deviation of its white noise.
-    fn trim_and_white(&self, py: Python<'_>, run: usize) -> PyResult<(f64, f64)> {
-        run_here(py, |task| self.core.trim_and_white(run, task))
+    /// Does the plant beside the noise explain far less of a recording than a fit of least squares?
+    fn explains_less(&self, py: Python<'_>, white: &Self) -> PyResult<bool> {
+        run_here(py, |task| self.core.explains_less(&white.core, task))
+    }
+
+    /// Is every recording rounded, and has no other noise than white beside?
+    #[getter]
+    fn is_rounding_alone(&self) -> bool {
+        self.core.is_rounding_alone()
+    }
+
+    /// Is what is left of each recording below this share of the range of its output?
+    fn leaves_less_than(&self, py: Python<'_>, share: f64) -> PyResult<bool> {
+        run_here(py, |task| self.core.leaves_less_than(share, task))
+    }
+
+    /// The noise of a recording in the units of its output: white noise, air and its time constant, trim,
+    /// coloured noise of the sensor and its time constant.
+    fn noise_in_units(&self, py: Python<'_>, run: usize) -> PyResult<[f64; 6]> {
+        let found = run_here(py, |task| self.core.noise_in_units(run, task))?;
+        let ((air, air_time), (sensor, sensor_time)) = (found.air, found.sensor);
+        Ok([found.white, air, air_time, found.trim, sensor, sensor_time])
     }
 
     /// Largest scatter of the times of rows (`stamps`) or of commands, s.

@@ -546,31 +546,31 @@ impl LeastSquaresMinimum {
         )
     }
 
+    /// Covariances of the parameters, for white residuals and for those with memory, of recordings of these
+    /// sizes; zero for parameters that are not `loose`.
+    fn spreads<'py>(
+        &self,
+        py: Python<'py>,
+        loose: Vec<usize>,
+        sizes: Vec<usize>,
+    ) -> PyResult<[Matrix<'py>; 2]> {
+        let jacobian: Floats<'_> = self.jacobian.bind(py).extract()?;
+        let (every, misfit) = (columns(&jacobian)?, self.misfit.bind(py).to_vec()?);
+        let count = every.len();
+        let own: Vec<Vec<f64>> = loose.iter().map(|place| every[*place].clone()).collect();
+        let white = core::white_covariance(&own, &misfit);
+        let robust = core::robust_covariance(&own, &misfit, &sizes);
+        let whole = |cov: &[f64]| {
+            let found = core::embedded(cov, &loose, count).into_pyarray(py);
+            found.reshape([count, count])
+        };
+        Ok([whole(&white)?, whole(&robust)?])
+    }
+
     /// Sum of squares.
     #[getter]
     fn cost(&self, py: Python<'_>) -> PyResult<f64> {
         let misfit = self.misfit.bind(py).to_vec()?;
         Ok(misfit.iter().map(|x| x * x).sum())
     }
-}
-
-/// Covariance of the parameters, for residuals with memory or (`white`) without, of recordings of these
-/// sizes.
-#[pyfunction]
-pub(crate) fn fit_covariance<'py>(
-    py: Python<'py>,
-    jacobian: Floats<'_>,
-    residuals: Floats<'_>,
-    sizes: Option<Vec<usize>>,
-    white: bool,
-) -> PyResult<Matrix<'py>> {
-    let (columns, residuals) = (columns(&jacobian)?, owned(&residuals)?);
-    let count = columns.len();
-    let found = if white {
-        core::white_covariance(&columns, &residuals)
-    } else {
-        let sizes = sizes.unwrap_or_else(|| vec![residuals.len()]);
-        core::robust_covariance(&columns, &residuals, &sizes)
-    };
-    found.into_pyarray(py).reshape([count, count])
 }

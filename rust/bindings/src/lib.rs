@@ -2,6 +2,7 @@
 
 mod arrays;
 mod boxes;
+mod called;
 mod calls;
 mod certificate;
 mod commanded;
@@ -17,6 +18,7 @@ mod flight_plant;
 mod frequency;
 mod inputs;
 mod judgement;
+mod known_filter;
 mod least_squares;
 mod literature;
 mod loading;
@@ -47,6 +49,8 @@ mod _deadtime {
         stability_radius,
     };
     #[pymodule_export]
+    use super::called::{interval_end, mixture_interval, secant_ends, shared_number};
+    #[pymodule_export]
     use super::certificate::{Certificate, Contour, Monotone, Segment};
     #[pymodule_export]
     use super::commanded::{CommandedMisfit, RoundedPeak, RoundedReadings};
@@ -58,7 +62,8 @@ mod _deadtime {
     use super::dde::{PyLinearLoop, PyLoopResponse, on_samples, rate_limited};
     #[pymodule_export]
     use super::estimation::{
-        PlantNumbers, RowLikelihood, RowNoise, held_response, whitened_columns,
+        PlantNumbers, RowLikelihood, RowNoise, coarse_step, felt_plant, follows_command,
+        held_response, independent_samples, most_moved, regular_times, whitened_columns,
     };
     #[pymodule_export]
     use super::family::{FamilyCandidate, FamilyFit, fit_family};
@@ -80,15 +85,17 @@ mod _deadtime {
     #[pymodule_export]
     use super::judgement::{FlightFinding, FlightJudgement, whiteness};
     #[pymodule_export]
+    use super::known_filter::KnownFilter;
+    #[pymodule_export]
     use super::least_squares::{
-        ChebyshevMisfit, LeastSquares, LeastSquaresMinimum, LinesMisfit, LoopMisfit, fit_covariance,
+        ChebyshevMisfit, LeastSquares, LeastSquaresMinimum, LinesMisfit, LoopMisfit,
     };
     #[pymodule_export]
     use super::literature::{
         HeldResponse, PathAt, arx_losses, correlation_coefficient, correlation_peak,
-        cycle_crossings, cycle_delay_by_lag, cycle_delays, cycle_switches, delay_of_rate,
-        extremes_decay, feedback_test, held_losses, loop_of_extremes, rise_tangent, step_extremes,
-        tail_rate, x_of_overshoot,
+        cycle_crossings, cycle_delay_by_lag, cycle_delays, cycle_path, cycle_peaks, cycle_switches,
+        delay_of_rate, extremes_decay, feedback_test, first_movement, held_losses, line_through,
+        loop_of_extremes, rise_tangent, step_extremes, step_tail, x_of_overshoot,
     };
     #[pymodule_export]
     use super::loops::{

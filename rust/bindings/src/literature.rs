@@ -1,6 +1,6 @@
 //! Bindings of the methods of the literature.
 
-use deadtime::estimation::{self as core, Extreme, HeldPath, Tangent, Weighting};
+use deadtime::estimation::{self as core, Extreme, HeldPath, TailReading, Tangent, Weighting};
 use numpy::{
     IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
@@ -61,15 +61,44 @@ pub(crate) fn loop_of_extremes(
     ((found.sigma, found.omega), made)
 }
 
-/// Height and rate of the exponential through a tail, and the standard error of the rate.
+/// Samples of the tail of a step response, and height, rate and the standard error of the rate of the
+/// exponential through them, none of too few. It begins where this share of the step is left, and no more
+/// than `most`; `clear` is a movement that stands out of the noise.
 #[pyfunction]
-pub(crate) fn tail_rate(
-    time: Floats<'_>,
-    left: Floats<'_>,
-    guess: f64,
-) -> PyResult<(f64, f64, f64)> {
-    let found = core::tail_rate(&in_order(&time)?, &in_order(&left)?, guess);
-    Ok((found.height, found.rate, found.error))
+#[expect(clippy::type_complexity, reason = "a tuple for Python")]
+pub(crate) fn step_tail(
+    since: Floats<'_>,
+    travelled: Floats<'_>,
+    share: f64,
+    most: f64,
+    clear: f64,
+    fewest: usize,
+) -> PyResult<(usize, Option<(f64, f64, f64)>)> {
+    let reading = TailReading {
+        share,
+        most,
+        clear,
+        fewest,
+    };
+    let (count, tail) = core::step_tail(&in_order(&since)?, &in_order(&travelled)?, reading);
+    Ok((count, tail.map(|own| (own.height, own.rate, own.error))))
+}
+
+/// The first sample from which on a step response stays above `least`, if there is one after the first.
+#[pyfunction]
+pub(crate) fn first_movement(travelled: Floats<'_>, least: f64) -> PyResult<Option<usize>> {
+    Ok(core::first_movement(&in_order(&travelled)?, least))
+}
+
+/// Where the line through two shares of a step response meets the initial output.
+#[pyfunction]
+pub(crate) fn line_through(
+    since: Floats<'_>,
+    travelled: Floats<'_>,
+    shares: (f64, f64),
+) -> PyResult<f64> {
+    let (since, travelled) = (in_order(&since)?, in_order(&travelled)?);
+    Ok(core::line_through(&since, &travelled, shares))
 }
 
 /// Delay of the loop with the root −rate, and its slope.
@@ -133,6 +162,39 @@ pub(crate) fn cycle_switches(
     let (time, signs) = (in_order(&time)?, in_order(&signs)?);
     let found = core::switches(&time, &signs, &in_order(&crossings)?);
     Ok(found.iter().map(|one| (one.count, one.time)).unzip())
+}
+
+/// Largest error between each crossing of a limit cycle and the next.
+#[pyfunction]
+pub(crate) fn cycle_peaks<'py>(
+    py: Python<'py>,
+    time: Floats<'_>,
+    error: Floats<'_>,
+    crossings: Floats<'_>,
+) -> PyResult<Vector<'py>> {
+    let (time, error) = (in_order(&time)?, in_order(&error)?);
+    Ok(core::peaks(&time, &error, &in_order(&crossings)?).into_pyarray(py))
+}
+
+/// First and last row of a limit cycle whose switches arrive after a delay, the path of unit speed there and
+/// the output, both about their means, and the speed along the path.
+#[pyfunction]
+#[expect(clippy::type_complexity, reason = "a tuple for Python")]
+pub(crate) fn cycle_path<'py>(
+    py: Python<'py>,
+    rows: (Floats<'_>, Floats<'_>, Floats<'_>),
+    switches: Floats<'_>,
+    delay: f64,
+    lag: f64,
+) -> PyResult<Option<([usize; 2], Vector<'py>, Vector<'py>, f64)>> {
+    let (time, output) = (in_order(&rows.0)?, in_order(&rows.1)?);
+    let (reference, switches) = (in_order(&rows.2)?, in_order(&switches)?);
+    let found = core::cycle_path((&time, &output, &reference), &switches, delay, lag);
+    Ok(found.map(|own| {
+        let ends = [own.rows.start, own.rows.end - 1];
+        let (path, output) = (own.path.into_pyarray(py), own.output.into_pyarray(py));
+        (ends, path, output, own.speed)
+    }))
 }
 
 /// Increase of a quarter of the period of a limit cycle by a lag.

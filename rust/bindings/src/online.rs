@@ -2,6 +2,7 @@
 
 use deadtime::estimation::{Answer, Lags, Online, Plant, Settings, online};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::arrays::converted;
 use crate::estimation::GivenDisturbance;
@@ -110,6 +111,7 @@ pub(crate) struct BankAnswer {
     gain: f64,
     gain_deviation: f64,
     gate: f64,
+    informed: bool,
     changed: bool,
     white: f64,
     colour: f64,
@@ -135,6 +137,7 @@ impl From<&Answer> for BankAnswer {
             gain: answer.gain,
             gain_deviation: answer.gain_deviation,
             gate: answer.gate,
+            informed: answer.is_informed(),
             changed: answer.changed,
             white: answer.white,
             colour: answer.colour,
@@ -143,5 +146,32 @@ impl From<&Answer> for BankAnswer {
             highest: answer.highest,
             evidence: answer.evidence,
         }
+    }
+}
+
+#[pymethods]
+impl BankAnswer {
+    /// The numbers that an estimate shows, by their names there.
+    #[getter]
+    fn shown<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let found = PyDict::new(py);
+        let numbers = [
+            ("time", self.time),
+            ("delay", self.delay),
+            ("stderr", self.delay_deviation),
+            ("lag", self.lag),
+            ("delay_plus_lag", self.together),
+            ("gain", self.gain),
+            ("gain_stderr", self.gain_deviation),
+        ];
+        for (name, value) in numbers {
+            found.set_item(name, value)?;
+        }
+        found.set_item("ci", (self.low.max(0.0), self.high))?;
+        let together = (self.together_low.max(0.0), self.together_high);
+        found.set_item("delay_plus_lag_ci", together)?;
+        found.set_item("informed", self.informed)?;
+        found.set_item("changed", self.changed)?;
+        Ok(found)
     }
 }

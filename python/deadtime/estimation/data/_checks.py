@@ -8,6 +8,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._native import independent_samples
 from deadtime.loops import ControlLoop, FactoredPlant, Integrator, ParametricPlant, Plant
 from deadtime.recordings import Finding, Recording, no_excitation, no_motion
 
@@ -138,12 +139,6 @@ def check_response(output: Array, misfit: Array, numbers: int, autocorrelation: 
             f"only {explained:.0f} % of the output's variance, as for noise alone. Check "
             "columns, signs and gains, choose a window with a step, or record a larger step"
         )
-
-
-def independent_samples(samples: int, autocorrelation: float) -> float:
-    """Number of independent samples that hold as much information as autocorrelated ones."""
-    rho = min(0.99, max(0.0, autocorrelation))
-    return samples * (1.0 - rho) / (1.0 + rho)
 
 
 def embedded(cov: Array, loose: list[int], size: int) -> Array:

@@ -24,6 +24,7 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import feedback_test
 from deadtime.estimation.data._checks import check_even, check_moves
 from deadtime.estimation.data._simulated import SimulatedRecording, commands_over_samples
+from deadtime.estimation.data._step_reading import check_decays, read_ringing
 from deadtime.loops import FirstOrder, Integrator
 from deadtime.recordings import Recording
 
@@ -113,3 +114,16 @@ def feedback_p_value(recording: Recording) -> float:
         return 0.0
     found = feedback_test(command, recording.reference, recording.output)
     return 1.0 if found is None else float(special.fdtrc(found[1], found[2], found[0]))
+
+
+def first_shift(recording: Recording, method: str) -> tuple[float, int]:
+    """That p-value, and the least delay in samples that a method looks for.
+
+    Feedback within the same sample looks like a response without delay. Refuses a command that
+    follows an output which does not decay.
+    """
+    p_value = feedback_p_value(recording)
+    if p_value >= FEEDBACK:
+        return p_value, 0
+    check_decays(read_ringing(recording), method)
+    return p_value, 1

@@ -8,18 +8,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
+from deadtime.estimation._native import regular_times
 from deadtime.estimation.methods._method import Run
-
-#: Farthest stamp from its regular time, in rows.
-FARTHEST = 0.45
-
-#: Largest relative difference of the clocks of log and controller.
-CLOCKS = 5e-3
-
-#: Difference of the two, in its deviations, below which they are one clock.
-SAME_CLOCK = 3.0
 
 
 def on_regular_times(run: Run) -> Run | None:
@@ -29,15 +19,8 @@ def on_regular_times(run: Run) -> Run | None:
         return None
     if run.recording.sent is not None:
         return None
-    time = run.recording.time
     between = loop.sample_time * (check.rate_ratio or 1)
-    number = np.concatenate([[0.0], np.cumsum(np.maximum(1.0, np.rint(np.diff(time) / between)))])
-    (spacing, start), cov = np.polyfit(number, time, 1, cov=True)
-    if abs(spacing / between - 1.0) > CLOCKS:
-        return None
-    if abs(spacing - between) < SAME_CLOCK * np.sqrt(cov[0, 0]):
-        spacing = between
-    regular = start + spacing * number
-    if np.max(np.abs(time - regular)) > FARTHEST * between:
+    regular = regular_times(run.recording.time, between)
+    if regular is None:
         return None
     return run._replace(recording=replace(run.recording, time=regular))

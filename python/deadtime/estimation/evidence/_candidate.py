@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import deadtime.estimation._native as native
 from deadtime._base.digits import time_unit
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime.loops import FactoredPlant, FirstOrder, Integrator, Plant, RationalPlant
+from deadtime.loops import PAIR, FactoredPlant, FirstOrder, Integrator, Plant, RationalPlant
 
 #: Lead in BIC from which a plant explains a recording clearly better: 10 is "very strong" of Kass
 #: and Raftery (1995). Smaller: the second is ruled out by chance; larger: hulls are wider.
@@ -109,19 +108,16 @@ def _time(value: float) -> str:
 
 def candidate_of(found: native.FamilyCandidate, best: float) -> PlantCandidate:
     """A candidate of the kernel; `best` is the least BIC."""
-    numbers = dict(zip(found.names, found.values.tolist(), strict=True))
-    delay, gain, zero = numbers["delay"], numbers["gain"], numbers.get("zero", 0.0)
+    delay, gain, lags, zero, poles = found.plant_of(found.values.tolist())
+    pair = dict(zip(PAIR, poles or (), strict=False))
     parameters = {"delay": delay, "gain": gain}
-    parameters |= {f"lag_{place}": lag for place, lag in enumerate(found.lags, 1)}
-    if "zero" in numbers:
+    parameters |= {f"lag_{place}": lag for place, lag in enumerate(lags, 1)}
+    if found.has_zero:
         parameters["zero"] = zero
-    pair: dict[str, float] = {}
-    if found.complex_poles:
-        pair = {"pole_frequency": found.pole_frequency, "pole_damping": found.pole_damping}
     return PlantCandidate(
         found.plant,
         delay,
-        _plant(gain, tuple(found.lags), zero, found.integrating, pair),
+        _plant(gain, tuple(lags), zero, found.integrating, pair),
         parameters | pair,
         found.bic - best,
         found.told,
@@ -129,21 +125,11 @@ def candidate_of(found: native.FamilyCandidate, best: float) -> PlantCandidate:
     )
 
 
-def plant_of(
-    names: Sequence[str], values: Sequence[float], integrator: bool
-) -> tuple[float, Plant]:
-    """The dead time and the plant with these numbers, by the names of the kernel."""
-    numbers = dict(zip(names, values, strict=True))
-    total, product = numbers.get("lag_sum", 0.0), numbers.get("lag_product", 0.0)
-    lags: tuple[float, ...] = (numbers["lag"],) if "lag" in numbers else ()
-    pair: dict[str, float] = {}
-    if product > 0.0 and total * total < 4.0 * product:
-        pair = {"pole_frequency": product**-0.5, "pole_damping": 0.5 * total * product**-0.5}
-    elif product > 0.0:
-        largest = 0.5 * (total + math.sqrt(total * total - 4.0 * product))
-        lags = (largest, product / largest)
-    zero = numbers.get("zero", 0.0)
-    return max(numbers["delay"], 0.0), _plant(numbers["gain"], lags, zero, integrator, pair)
+def plant_of(found: native.FamilyCandidate, values: Sequence[float]) -> tuple[float, Plant]:
+    """The dead time and the plant of a candidate with these values of its numbers."""
+    delay, gain, lags, zero, poles = found.plant_of(values)
+    pair = dict(zip(PAIR, poles or (), strict=False))
+    return max(delay, 0.0), _plant(gain, tuple(lags), zero, found.integrating, pair)
 
 
 def _plant(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import deadtime.estimation._native as native
 from deadtime._base.digits import shown
@@ -149,12 +149,9 @@ def causes_of(found: native.FamilyFit) -> tuple[Cause, ...]:
         began = None if math.isnan(time) else time
         named.append(Cause(NAMES.get(kind, kind), size, ends, began, lead, (), kind))
     if named and found.rival_causes:
-        last = named.pop()
         others = dict.fromkeys(NAMES.get(kind, kind) for kind in found.rival_causes)
-        others.pop(last.name, None)
-        named.append(
-            Cause(last.name, last.size, last.ci, last.time, last.lead, tuple(others), last._kind)
-        )
+        others.pop(named[-1].name, None)
+        named[-1] = replace(named[-1], others=tuple(others))
     return tuple(named)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, TypeAlias, cast
@@ -17,16 +17,8 @@ from deadtime.estimation.evidence._candidate import CLEAR, candidate_of
 from deadtime.estimation.evidence._causes import causes_of, sensor_faults_of
 from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._numbers import FittedRecording
-from deadtime.estimation.evidence._question import Between, Question, questions_of
-from deadtime.estimation.evidence._words import (
-    LEVELS,
-    ROUNDING,
-    TAKEN_AT_REST,
-    TOO_EARLY,
-    moves_in,
-    reason_of,
-)
-from deadtime.loops import Controller
+from deadtime.estimation.evidence._question import Question, questions_of
+from deadtime.estimation.evidence._words import TAKEN_AT_REST, TOO_EARLY, moves_in, reason_of
 from deadtime.recordings import Recording
 
 #: Lower and upper end of an interval.
@@ -35,37 +27,18 @@ Ends: TypeAlias = tuple[float, float]
 
 def estimate_by_evidence(
     recording: Recording | Sequence[Recording],
-    *,
-    window: OpenRange | Sequence[OpenRange | None] | None = None,
-    closed_loop: bool | None = None,
-    at_rest: bool | None = None,
-    largest_delay: float | None = None,
-    integrates: bool | None = None,
-    between: Between = "undecided",
-    hold: float | None = None,
-    plant: str | None = None,
-    controller: Controller | Sequence[Controller] | None = None,
-    limit: float | None = None,
-    causes: bool | None = None,
-    progress: Callable[[int], object] | None = None,
+    window: OpenRange | Sequence[OpenRange | None] | None,
+    known: Mapping[str, Any],
+    progress: Callable[[int], object] | None,
 ) -> PlantEstimate:
-    """The plant that recordings show; what is not given is taken from them."""
-    known = {
-        "at_rest": at_rest,
-        "largest_delay": largest_delay,
-        "integrates": integrates,
-        "between": between,
-        "hold": hold or 0.0,
-        "plant": plant,
-        "causes": causes is not False,
-    }
-    question = questions_of(recording, window, controller, limit, closed_loop, known)
+    """The plant that recordings show; what is not `known` by its name is taken from them."""
+    question = questions_of(recording, window, known)
     found = question.answer(progress=progress)
     first = estimate_of(question, found)
     moves_at_all = any(np.ptp(one.command) > 0.0 for one in question.each)
     if first.at_rest or moves_in(first) or not moves_at_all:
         return _beside_all(first, found)
-    if at_rest is False:
+    if question.at_rest is False:
         return replace(first, verdict="none", reason=TOO_EARLY)
     question = replace(question, at_rest=True)
     found = question.answer()
@@ -153,21 +126,16 @@ def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
         "plant": None if best is None else best.plant,
         "parameters": {} if best is None else dict(best.parameters),
     }
-    step = _coarse_step(runs)
+    steps = [native.coarse_step(run.recording.output, run.noise_std) for run in runs]
+    step = next(filter(None, steps), 0.0)
     verdict = "indication" if step and found.verdict == "reliable" else found.verdict
     return PlantEstimate(
         verdict=cast(Verdict, verdict),
         reason=reason_of(found.reason, found, _is_one_step(question), step),
         **numbers,
-        crossover=found.crossover,
-        largest_gain=found.largest_gain,
+        **found.shown,
         candidates=candidates,
-        intervals={name: (float(low), float(high)) for name, (low, high) in found.hull.items()},
-        determined=found.told,
-        asked=found.asked,
         shift=found.shift + question.shift,
-        at_rest=found.at_rest,
-        excited=np.array(found.excited, dtype=float),
         recording=question.recording,
         fitted=runs[0].fitted,
         residuals=runs[0].residuals,
@@ -177,11 +145,6 @@ def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
         _own_noise=runs[0].noise_std,
         _code=found.reason,
         _question=question,
-        _at_crossover=(
-            found.gain_at_crossover,
-            found.phase_at_crossover,
-            found.delay_at_crossover,
-        ),
         _native=[found],
     )
 
@@ -189,22 +152,6 @@ def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
 def _is_one_step(question: Question) -> bool:
     """Whether the command changes once, in one recording."""
     return not question.others and np.count_nonzero(np.diff(question.command)) == 1
-
-
-def _coarse_step(runs: Sequence[FittedRecording]) -> float:
-    """Step of a sensor that is coarse for how far it moves and beside its noise; zero of others."""
-    for run in runs:
-        output = run.recording.output
-        output = output[np.isfinite(output)]
-        span = float(np.ptp(output)) if output.size else 0.0
-        moves = np.abs(np.diff(output))
-        moves = moves[moves > 1e-9 * span]
-        step = float(moves.min()) if moves.size else 0.0
-        multiples = moves / step
-        are_whole = np.allclose(multiples, np.round(multiples), atol=0.01)
-        if are_whole and span < LEVELS * step and run.noise_std < ROUNDING * step:
-            return step
-    return 0.0
 
 
 def _run(question: Question, first: native.FamilyCandidate | None, place: int) -> FittedRecording:

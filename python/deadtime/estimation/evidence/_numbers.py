@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 import deadtime.estimation._native as native
 from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.validation import one_dimensional
+from deadtime._base.validation import confidence, one_dimensional
 from deadtime._base.verdicts import Verdict
 from deadtime.estimation.evidence._candidate import CLEAR, PlantCandidate, plant_of
 from deadtime.estimation.evidence._causes import Cause, SensorFault
@@ -51,6 +51,39 @@ class LoopView(ReadOnlyArrays):
     delay_ci: Array
 
 
+def frequencies(name: str, given: ArrayLike) -> Array:
+    """The given frequencies, refused unless they are above zero."""
+    omega = one_dimensional(name, np.atleast_1d(np.asarray(given, dtype=float)))
+    bad = omega[~(omega > 0.0)]
+    if bad.size:
+        raise ValueError(f"{name}={bad[0]:g} rad/s: give frequencies above zero")
+    return omega
+
+
+class AtCrossover:
+    """What a loop feels of a plant at `crossover`."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def _at_crossover(self) -> tuple[float, float, float]: ...
+
+    @property
+    def gain_at_crossover(self) -> float:
+        """Size of G at `crossover`."""
+        return self._at_crossover[0]
+
+    @property
+    def phase_at_crossover(self) -> float:
+        """Angle of G at `crossover`, rad."""
+        return self._at_crossover[1]
+
+    @property
+    def delay_at_crossover(self) -> float:
+        """Equivalent delay at `crossover`, s."""
+        return self._at_crossover[2]
+
+
 @dataclass(frozen=True, eq=False)
 class FittedRecording(ReadOnlyArrays):
     """A further recording of the plant, and what the likeliest plant explains of it.
@@ -72,7 +105,7 @@ class FittedRecording(ReadOnlyArrays):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FoundPlant(ReadOnlyArrays):
+class FoundPlant(AtCrossover, ReadOnlyArrays):
     """The plant that a recording shows, as numbers: the attributes of `PlantEstimate`."""
 
     verdict: Verdict
@@ -131,21 +164,6 @@ class FoundPlant(ReadOnlyArrays):
         best = self.best
         return best.delay + best.lag_sum - self.parameters.get("zero", 0.0)
 
-    @property
-    def delay_at_crossover(self) -> float:
-        """Equivalent delay at `crossover`, s."""
-        return self._at_crossover[2]
-
-    @property
-    def gain_at_crossover(self) -> float:
-        """Size of G at `crossover`."""
-        return self._at_crossover[0]
-
-    @property
-    def phase_at_crossover(self) -> float:
-        """Angle of G at `crossover`, rad."""
-        return self._at_crossover[1]
-
     def ci(self, level: float = 0.95, name: str = "delay") -> tuple[float, float]:
         """Interval of a number, over all kinds of plant that explain the recording alike.
 
@@ -196,8 +214,7 @@ class FoundPlant(ReadOnlyArrays):
 
     def _check(self, level: float, name: str) -> None:
         """Refuse an interval that there is not."""
-        if not 0.0 < level < 1.0:
-            raise ValueError(f"level={level!r} is not between 0 and 1: give a level such as 0.95")
+        confidence(level)
         if self.verdict == "none":
             raise ValueError(f"no interval: {self.reason}")
         if name not in self.intervals:
@@ -230,10 +247,7 @@ class FoundPlant(ReadOnlyArrays):
         -------
         LoopView
         """
-        given = one_dimensional("omega", np.atleast_1d(np.asarray(omega, dtype=float)))
-        bad = given[~(given > 0.0)]
-        if bad.size:
-            raise ValueError(f"omega={bad[0]:g} rad/s: give frequencies above zero")
+        given = frequencies("omega", omega)
         found = self._answer().at(given.tolist())
         values = {name: np.array(found[name][0]) for name in ("gain", "phase", "delay")}
         ends = {f"{name}_ci": np.array(found[name][1:]) for name in values}
@@ -326,8 +340,7 @@ class FoundPlant(ReadOnlyArrays):
         ValueError
             If the verdict is ``"none"``.
         """
-        if self.plant is None or self.verdict == "none":
-            raise ValueError(f"no plant: {self.reason}")
+        around = self.loop(controller, sample_time=sample_time, limit=limit)
         found = self._answer().candidates
         least = min(one.bic for one in found)
         near = [one for one in found if one.bic <= least + CLEAR and one.told == len(one.names)]
@@ -335,11 +348,8 @@ class FoundPlant(ReadOnlyArrays):
         for one in near or found[:1]:
 
             def number(values: Array, one: native.FamilyCandidate = one) -> float:
-                delay, plant = plant_of(one.names, values.tolist(), one.integrating)
-                loop = ControlLoop(
-                    plant, controller, delay=delay, sample_time=sample_time, limit=limit
-                )
-                return float(of(loop))
+                delay, plant = plant_of(one, values.tolist())
+                return float(of(around.replace(plant=plant, delay=delay)))
 
             steps = np.diag(STEP * np.array(one.errors))
             values, n = np.array(one.values), len(one.names)

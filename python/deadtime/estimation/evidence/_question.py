@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -13,7 +14,8 @@ import deadtime.estimation._native as native
 from deadtime._base.arrays import Array
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.validation import OpenRange, is_range, open_interval, positive
+from deadtime._base.validation import OpenRange, open_interval, positive
+from deadtime.estimation.data._given import given_recordings, one_each
 from deadtime.estimation.data._on_its_row import on_its_row, rows_off
 from deadtime.loops import Controller, ControlLoop, Integrator, P
 from deadtime.recordings import Columns, Recording
@@ -96,13 +98,11 @@ class Question(ReadOnlyArrays):
 
     def answer(
         self,
-        level: float = 0.95,
-        omega: Sequence[float] = (),
         progress: Callable[[int], object] | None = None,
         known: native.FamilyFit | None = None,
         noise: str | None = None,
     ) -> native.FamilyFit:
-        """Ask the kernel; every interval of the answer has this level.
+        """Ask the kernel; every interval of the answer is one of 95 %.
 
         With the answer to fewer rows, plants are looked for beside those alone; with a noise, under
         that alone.
@@ -116,10 +116,8 @@ class Question(ReadOnlyArrays):
             largest_delay=self.largest_delay,
             plant=self.plant,
             integrating=self.integrates,
-            level=level,
             noise=noise,
             causes=self.causes,
-            omega=tuple(omega),
             progress=progress,
             known=known,
         )
@@ -172,46 +170,27 @@ class Question(ReadOnlyArrays):
 def questions_of(
     recording: Recording | Sequence[Recording],
     window: OpenRange | Sequence[OpenRange | None] | None,
-    controller: Controller | Sequence[Controller] | None,
-    limit: float | None,
-    closed_loop: bool | None,
     known: Mapping[str, Any],
 ) -> Question:
     """The question about one recording, or about several of one plant."""
-    recordings = [recording] if isinstance(recording, Recording) else list(recording)
-    if not recordings:
-        raise ValueError("no recording was given: give a recording, or a list of recordings")
-    is_list = isinstance(window, (tuple, list)) and not (len(window) == 2 and is_range(window))
-    windows = _each("window", window, not is_list, len(recordings))
-    is_list = isinstance(controller, (tuple, list))
-    controllers = _each("controller", controller, not is_list, len(recordings))
-    first, *others = [
-        question_of(its, ends, closed_loop, own, limit, known)
-        for its, ends, own in zip(recordings, windows, controllers, strict=True)
-    ]
+    recordings = given_recordings(recording)
+    windows = one_each("window", window, len(recordings))
+    controllers = one_each("controller", known["controller"], len(recordings))
+    first, *others = map(partial(question_of, known=known), recordings, windows, controllers)
     in_loop = any(asked.closed_loop for asked in (first, *others))
     return replace(first, closed_loop=in_loop, others=tuple(others))
-
-
-def _each(name: str, given: Any, is_one: bool, number: int) -> list[Any]:
-    """What was given for all recordings, or one each, as a list."""
-    out = [given] * number if is_one else list(given)
-    if len(out) != number:
-        raise ValueError(
-            f"{number} recordings and {len(out)} of `{name}`: give one for all, or one each"
-        )
-    return out
 
 
 def question_of(
     recording: Recording,
     window: OpenRange | None,
-    closed_loop: bool | None,
     controller: Controller | None,
-    limit: float | None,
     known: Mapping[str, Any],
 ) -> Question:
-    """Check what the caller has given of one recording."""
+    """Check what the caller has given of one recording; what is None is not `known`."""
+    given = {name: value for name, value in known.items() if value is not None}
+    given["controller"] = controller
+    limit = given.get("limit")
     if not isinstance(recording, Recording):
         raise TypeError(f"recording must be a Recording, not {type(recording).__name__}")
     shift = 0
@@ -227,28 +206,17 @@ def question_of(
             "the recording has no command, so nothing shows what moved the plant. Name the "
             "column of the command, as in read_recording(..., command='OP'), or give the loop"
         )
-    plant, largest_delay = known.get("plant"), known.get("largest_delay")
-    if (hold := known.get("hold")) and not 0.0 < hold < math.inf:
+    if (hold := given.get("hold")) and not 0.0 < hold < math.inf:
         raise ValueError(f"hold={hold!r} s: give a time above zero")
-    if plant is not None and plant not in PLANTS:
+    if (plant := given.get("plant", PLANTS[0])) not in PLANTS:
         raise ValueError(f"plant={plant!r} is not one of {', '.join(map(repr, PLANTS))}")
-    if largest_delay is not None:
-        positive("largest_delay", largest_delay)
+    if "largest_delay" in given:
+        positive("largest_delay", given["largest_delay"])
     low, high = open_interval("window", window)
     rows = recording.rows(low, high)
     part = recording.window(None, float(recording.time[rows.stop - 1]))
-    if closed_loop is None:
-        closed_loop = controller is not None or shows_controller(part)
-    return Question(
-        part,
-        rows.start,
-        closed_loop,
-        controller=controller,
-        window=window,
-        limit=limit,
-        shift=shift,
-        **known,
-    )
+    given.setdefault("closed_loop", controller is not None or shows_controller(part))
+    return Question(part, rows.start, window=window, shift=shift, **given)
 
 
 def _with_command(

@@ -29,7 +29,6 @@ from deadtime.estimation.data._simulated import moves_between_rows
 from deadtime.estimation.evidence._candidate import CLEAR, PlantCandidate, candidate_of
 from deadtime.estimation.evidence._find import is_outside
 from deadtime.estimation.evidence._question import PLANTS, Question, question_of
-from deadtime.estimation.evidence._screen import may_have_rivals
 from deadtime.estimation.methods._method import Method, Run
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.loops import PAIR, FactoredPlant, FirstOrder, Integrator, P, Plant
@@ -45,7 +44,7 @@ def beside_rivals(fit: DelayEstimate, run: Run, method: Method) -> DelayEstimate
     kind, question = kind_of(fit.loop.plant, fit.free), _question(run)
     if kind is None or question is None:
         return fit
-    if not may_have_rivals(fit, question):
+    if not _may_have_rivals(fit, question):
         return fit
     # The commands as they are in the estimate. Under white noise alone leads are larger.
     straight = moves_between_rows(run.recording, run.loop)
@@ -94,6 +93,29 @@ def kind_of(plant: Plant, free: Sequence[str]) -> str | None:
     return None
 
 
+def _may_have_rivals(fit: DelayEstimate, question: Question) -> bool:
+    """Whether the command behind lags and delays explains what a fit leaves, beyond chance.
+
+    What least squares leaves of a plant that lacks something has no noise to compare with.
+    """
+    plant, noise = fit.loop.plant, None
+    if isinstance(fit._profile, native.FlightProfile):
+        noise = fit._profile.fit.numbers.noise[0]
+    elif fit.verdict == "indication":
+        return True
+    rows, time = question.recording.time, fit.recording.time
+    known = np.isfinite(fit.residuals)
+    known &= (time >= rows[question.earlier]) & (time <= rows[-1])
+    return native.follows_command(
+        (rows, question.command - question.command[0]),
+        (time[known], fit.residuals[known], fit.recording.sample_time),
+        (fit.delay, fit.lag or 0.0),
+        plant._polynomials({**plant.parameters, "gain": 1.0}),
+        noise,
+        CLEAR,
+    )
+
+
 def _question(run: Run) -> Question | None:
     """What is asked of the family; None where the command of each row is not known."""
     loop = run.loop
@@ -105,7 +127,7 @@ def _question(run: Run) -> Question | None:
     controller, limit = (loop.controller, loop.limit) if computed else (None, None)
     recording, window = _most_excited(run)
     try:
-        return question_of(recording, window, None, controller, limit, {"causes": False})
+        return question_of(recording, window, controller, {"limit": limit, "causes": False})
     except DeadtimeError:
         return None
 
@@ -119,11 +141,8 @@ def _most_excited(run: Run) -> tuple[Recording, OpenRange]:
     if rows.stop - rows.start <= MOST_ROWS:
         return run.recording, run.window
     command = run.recording.command
-    moves = np.abs(np.diff(run.recording.reference if command is None else command))
-    moves = moves[rows.start : rows.stop - 1]
-    total = np.concatenate([[0.0], np.cumsum(moves)])
-    within = MOST_ROWS - 1
-    first = rows.start + int(np.argmax(total[within:] - total[:-within]))
+    moving = run.recording.reference if command is None else command
+    first = rows.start + native.most_moved(moving[rows], MOST_ROWS)
     time = run.recording.time
     window = float(time[first]), float(time[first + MOST_ROWS - 1])
     return run.recording.window(float(time[max(0, first - MOST_ROWS)]), window[1]), window

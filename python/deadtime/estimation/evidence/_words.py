@@ -95,14 +95,6 @@ TAKEN_AT_REST = "the plant is assumed at rest at the first row, which the record
 #: The kernel's reason where residuals are no noise of a sensor.
 NOT_WHITE = "residuals not white"
 
-#: Deviation of the residuals, in steps of a sensor, below which they are mostly rounding, whose own
-#: is 0.29. Larger: noise of a sensor is taken for rounding.
-ROUNDING = 0.5
-
-#: Readings between the least and the largest value of a sensor from which on its rounding acts like
-#: noise. Fewer: rounding is correlated with the output, and intervals do not hold.
-LEVELS = 32
-
 #: Reasons that are those of one step, if the command is one.
 FEW_NUMBERS = ("too few told", "classes contradict", "crossover not told")
 

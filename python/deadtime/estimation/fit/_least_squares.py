@@ -38,10 +38,6 @@ class Fit(ABC):
         """Weighted residuals, simulated minus recorded output, one recording after the other."""
         return self.problem.misfit(point)
 
-    def jacobian(self, point: Array) -> Array:
-        """Derivatives of the weighted residuals, shape (n, p)."""
-        return self.problem.jacobian(point)
-
 
 #: Where a sum of squares is least, with the misfit there and its derivatives.
 Minimum: TypeAlias = LeastSquaresMinimum

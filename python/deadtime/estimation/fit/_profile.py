@@ -8,11 +8,13 @@ coloured, the quantile is widened by the ratio of robust and plain standard erro
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+import deadtime.estimation._native as native
 from deadtime.estimation.fit._least_squares import Minimum, Model
 
 #: Farthest end of an interval, in multiples of the Gaussian one.
@@ -85,49 +87,29 @@ class Profile:
         from scipy import special
 
         quantile = float(special.stdtrit(self.freedom, 0.5 + level / 2))
-        floor = floor_of(name)
         reach = max(stderr, 1e-9 * abs(value), 1e-12)
-        return self._end(name, value, -reach, quantile, floor), self._end(
-            name, value, reach, quantile, floor
-        )
 
-    def _end(self, name: str, value: float, reach: float, quantile: float, floor: float) -> float:
-        # In t itself, which is nearly linear, so that the root search converges quickly.
-        from scipy.optimize import brentq
-
-        def excess(offset: float) -> float:
+        def excess(end: float) -> float:
             # At the best fit itself the search for the others may end a little above it.
-            rise = self.statistic(name, value + offset) if offset else 0.0
-            return float(np.sqrt(rise) - quantile)
+            rise = self.statistic(name, end) if end != value else 0.0
+            return math.sqrt(rise) - quantile  # nearly linear, as the square is not
 
-        inner, factor = 0.0, FIRST_STEP * quantile
-        while factor <= FARTHEST:
-            outer = reach * factor
-            if value + outer <= floor:
-                if excess(floor - value) <= 0.0:
-                    return floor
-                outer = floor - value
-            if excess(outer) > 0.0:
-                return value + float(brentq(excess, inner, outer, xtol=TOLERANCE * abs(reach)))
-            inner, factor = outer, 2.0 * factor
-        return value + inner
+        step, floor = FIRST_STEP * quantile * reach, floor_of(name)
+        low, high = (
+            native.interval_end(excess, value, way, floor, FARTHEST * reach, TOLERANCE * reach)
+            for way in (-step, step)
+        )
+        return low, high
 
 
-@dataclass(frozen=True)
-class ProfileCost:
-    """Least cost with one quantity held, the others free.
+def least_cost(
+    model: Model, best: Minimum, known: Mapping[str, float], name: str, value: float
+) -> float:
+    """Least sum of squares with `name`, a parameter or a sum, at `value`, the others free.
 
     `known` holds the parameters that were not fitted, which may be part of a sum.
     """
-
-    model: Model
-    best: Minimum
-    known: Mapping[str, float]
-
-    def __call__(self, name: str, value: float) -> float:
-        """Return the least sum of squares with `name`, a parameter or a sum, at `value`."""
-        held = places_of(name, value, self.model, self.known)
-        return self.model.problem.least_held(self.best, *held)
+    return model.problem.least_held(best, *places_of(name, value, model, known))
 
 
 def places_of(

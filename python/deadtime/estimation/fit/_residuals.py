@@ -1,10 +1,8 @@
-"""Test of residuals for whiteness, and the covariance of a fit for white and coloured ones.
+"""Test of residuals for whiteness.
 
 Least squares gives the covariance ``σ² (JᵀJ)⁻¹`` only for residuals that are white. Coloured
 ones (an incomplete model, sensor noise that the controller acts on) carry less information than
-their number suggests; the sandwich ``(JᵀJ)⁻¹ S (JᵀJ)⁻¹`` with Newey and
-West's (1987) long-run covariance S of the scores ``J_t e_t`` stays valid for them. Its
-bandwidth is Andrews' (1991, eq. 6.2 and 6.4) plug-in for the Bartlett kernel.
+their number suggests. The kernel has both covariances (`least_squares/covariance.rs`).
 """
 
 from __future__ import annotations
@@ -15,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from deadtime._base.arrays import Array
-from deadtime.estimation._native import LEVEL_OF_TESTS, fit_covariance, whiteness
+from deadtime.estimation._native import LEVEL_OF_TESTS, whiteness
 
 
 @dataclass(frozen=True)
@@ -60,18 +58,3 @@ def whiteness_of(
 def pieces_of(values: Array, sizes: Sequence[int] | None) -> list[Array]:
     """Rows that belong to recordings of these sizes."""
     return [values] if sizes is None else np.split(values, np.cumsum(sizes)[:-1])
-
-
-def white_covariance(jacobian: Array, residuals: Array) -> Array:
-    """Covariance of the parameters for white residuals, ``σ² (JᵀJ)⁻¹``."""
-    return fit_covariance(jacobian, residuals, None, True)
-
-
-def robust_covariance(
-    jacobian: Array, residuals: Array, sizes: Sequence[int] | None = None
-) -> Array:
-    """Covariance of the parameters that is also valid for autocorrelated residuals.
-
-    Recordings, of these `sizes`, are independent of each other.
-    """
-    return fit_covariance(jacobian, residuals, sizes, False)

@@ -24,9 +24,8 @@ import numpy as np
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.estimation._native import arx_losses, held_losses
-from deadtime.estimation.data._input_output import FEEDBACK, feedback_p_value, read_input_output
+from deadtime.estimation.data._input_output import first_shift, read_input_output
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.data._step_reading import check_decays, read_ringing
 from deadtime.estimation.methods._conclusion import OfOne, Read
 from deadtime.estimation.methods._method import Run
 
@@ -70,11 +69,7 @@ class ARXScan(OfOne):
         loop, simulated = run.loop, SimulatedRecording(*run[:3])
         data = simulated.recording
         read = read_input_output(simulated, "arx_scan")
-        # Feedback within the same sample looks like a response without delay.
-        feedback = feedback_p_value(data) < FEEDBACK
-        least = 1 if feedback else 0
-        if feedback:
-            check_decays(read_ringing(data), "arx_scan")
+        _, least = first_shift(data, "arx_scan")
         if self.fractional:
             if read.remark:
                 raise ValueError(

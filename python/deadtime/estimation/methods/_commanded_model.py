@@ -17,24 +17,16 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+import deadtime.estimation._native as native
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._native import (
-    LONGEST_DELAY,
-    SHORTEST_LAG,
-    CommandedMisfit,
-    FlightFit,
-    FlightRows,
-    HeldCommands,
-)
 from deadtime.estimation.data._checks import check_moves
-from deadtime.estimation.data._known_filter import KnownFilter, before_filter
+from deadtime.estimation.data._known_filter import before_filter
 from deadtime.estimation.data._simulated import commands_of, limited
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, place_of
 from deadtime.estimation.likelihood._plant import behind_limits, plant_model
 from deadtime.estimation.methods._method import Run
 from deadtime.loops import FirstOrder, Integrator, P, Plant, RateLimited
-from deadtime.recordings import RecordingCheck
 
 #: Names of the limits of the rate of a command.
 RATE_LIMITS = ("rate", "rate_of_rate")
@@ -57,7 +49,7 @@ class Assumed(NamedTuple):
 
     initial_output: float | None = None
     computed: bool = False
-    output_filter: KnownFilter | None = None
+    output_filter: native.KnownFilter | None = None
     air: Literal["command", "vehicle"] = "command"
     intervals: Literal["all", "sum"] = "all"
     complete: bool = False
@@ -70,22 +62,12 @@ class CommandedModel(ModelOfOne):
     plant: Plant
     known: Mapping[str, float]
     source: str
-    commands: HeldCommands
+    commands: native.HeldCommands
+    rows: native.FlightRows
+    repeated: list[int]
     start: Array
 
-    def rows(self, initial_output: float | None, check: RecordingCheck | None) -> FlightRows:
-        """The rows for the likelihood, without repeated rows."""
-        data, repeated = self.recording, [] if check is None else check.repeated.tolist()
-        rows = FlightRows.read(data.time, data.output, repeated, self.commands, initial_output)
-        if rows.rounding and rows.count < _fewest(self.names):
-            raise NotIdentifiableError(
-                f"the output is rounded to {rows.rounding:g}, and moves over only {rows.count} "
-                f"such steps, too few to fit {len(self.names)} parameters and an initial "
-                "output. Choose a longer window, or one in which the output moves more"
-            )
-        return rows
-
-    def limited(self, rows: FlightRows, values: Mapping[str, float]) -> FlightRows:
+    def limited(self, rows: native.FlightRows, values: Mapping[str, float]) -> native.FlightRows:
         """The rows with the command that the plant gets within these limits of its rate."""
         if not isinstance(self.plant, RateLimited):
             return rows
@@ -93,7 +75,7 @@ class CommandedModel(ModelOfOne):
         held = self.plant._replace(limits).limited(self.commands.time, self.commands.command)
         return rows.under(*held)
 
-    def started(self, fit: FlightFit, limits: Mapping[str, float]) -> CommandedModel:
+    def started(self, fit: native.FlightFit, limits: Mapping[str, float]) -> CommandedModel:
         """The same with its search started from a fit of the likelihood within these limits."""
         numbers = fit.with_gain
         values = {"delay": numbers.delay, "gain": numbers.gain, "zero": numbers.zero, **limits}
@@ -107,14 +89,14 @@ class CommandedModel(ModelOfOne):
         return replace(moved, start=point)
 
     @property
-    def kernel(self) -> CommandedMisfit:
+    def kernel(self) -> native.CommandedMisfit:
         """The misfit of the kernel."""
         plant, data, commands = behind_limits(self.plant), self.recording, self.commands
         is_lag = isinstance(plant, FirstOrder)
         slow = "time_constant" if is_lag else "lag" if isinstance(plant, Integrator) else ""
         numbers = {**plant.parameters, **self.known, "gain": 1.0}
         names = ("delay", "gain", slow, *RATE_LIMITS)
-        return CommandedMisfit(
+        return native.CommandedMisfit(
             data.time,
             data.output,
             (commands.time, commands.command),
@@ -139,10 +121,10 @@ class CommandedModel(ModelOfOne):
         value = self.known.get(label, 1.0)
         if label.startswith("lag_") and value >= 0.0:
             # A shorter one acts as a delay, and takes ever longer to simulate.
-            return Ends(SHORTEST_LAG * self.recording.sample_time, self.span)
+            return Ends(native.SHORTEST_LAG * self.recording.sample_time, self.span)
         positive = Ends(1e-3 * abs(value), 1e3 * abs(value))
         return {
-            "delay": Ends(0.0, LONGEST_DELAY * self.span),
+            "delay": Ends(0.0, native.LONGEST_DELAY * self.span),
             "lag": Ends(0.0, self.span),
             "time_constant": positive,
             "rate": positive,
@@ -167,9 +149,9 @@ def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> Comma
     integrates = plant_model(loop.plant, ()).integrates
     if data.sent is not None and not computed:
         sent = data.sent.time, limited(data.sent.values, loop)
-        commands = HeldCommands.with_times(*sent, data.time, integrates, complete)
+        commands = native.HeldCommands.with_times(*sent, data.time, integrates, complete)
     else:
-        commands = HeldCommands.of_rows(
+        commands = native.HeldCommands.of_rows(
             recording.time[: rows.stop],
             recording.reference[: rows.stop],
             recording.output[: rows.stop],
@@ -187,6 +169,14 @@ def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> Comma
             "commands are missing. But a plant with a rate limit depends "
             "on every command. Choose a window without missing rows"
         )
+    repeated = [] if run.check is None or known is not None else run.check.repeated.tolist()
+    read = native.FlightRows.read(data.time, data.output, repeated, commands, initial_output)
+    if read.rounding and read.count < _fewest(names):
+        raise NotIdentifiableError(
+            f"the output is rounded to {read.rounding:g}, and moves over only {read.count} such "
+            f"steps, too few to fit {len(names)} parameters and an initial output. Choose "
+            "a longer window, or one in which the output moves more"
+        )
     return CommandedModel(
         recording=data,
         names=names,
@@ -195,6 +185,8 @@ def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> Comma
         known={"delay": 0.0, "gain": 1.0, **loop.parameters},
         source=source,
         commands=commands,
+        rows=read,
+        repeated=repeated,
         start=np.empty(0),
     )
 

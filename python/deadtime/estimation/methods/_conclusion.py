@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,7 +27,6 @@ from deadtime.estimation.data._checks import (
     ROUNDING,
     check_distinguishable,
     check_response,
-    embedded,
     standard_errors,
 )
 from deadtime.estimation.data._simulated import SimulatedRecording
@@ -35,14 +35,8 @@ from deadtime.estimation.fit._least_squares import (
     Model,
     without_vanishing as without_vanishing,
 )
-from deadtime.estimation.fit._profile import Profile, ProfileCost
-from deadtime.estimation.fit._residuals import (
-    Whiteness,
-    pieces_of,
-    robust_covariance,
-    white_covariance,
-    whiteness_of,
-)
+from deadtime.estimation.fit._profile import Profile, least_cost
+from deadtime.estimation.fit._residuals import Whiteness, pieces_of, whiteness_of
 from deadtime.estimation.methods._method import Method, Run
 from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop
@@ -124,7 +118,7 @@ def concluded(
         details={**details, **{name: values[name] for name in ("start",) if name in values}},
         others=runs[1:],
         _profile=Profile(
-            cost=ProfileCost(model, found, runs[0].loop.parameters),
+            cost=partial(least_cost, model, found, runs[0].loop.parameters),
             best=found.cost,
             freedom=freedom,
             widening=_widening(values, errors, plain),
@@ -140,10 +134,9 @@ def spreads_of(
 
     Zero for parameters that are not `loose`; refuses those that the recording does not distinguish.
     """
-    jacobian, residuals, count = found.jacobian[:, loose], -found.misfit, len(labels)
-    check_distinguishable(jacobian, [labels[i] for i in loose])
-    white = embedded(white_covariance(jacobian, residuals), loose, count)
-    return white, embedded(robust_covariance(jacobian, residuals, sizes), loose, count)
+    check_distinguishable(found.jacobian[:, loose], [labels[i] for i in loose])
+    white, robust = found.spreads(loose, sizes)
+    return white, robust
 
 
 def check_fit(model: Model, found: Minimum, fitted: Sequence[Run]) -> Whiteness:

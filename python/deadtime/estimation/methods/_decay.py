@@ -18,11 +18,9 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
-from deadtime.estimation._native import delay_of_rate, tail_rate
+from deadtime.estimation._native import delay_of_rate, step_tail
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import (
     CLEARANCE,
@@ -34,8 +32,8 @@ from deadtime.estimation.methods._conclusion import OfOne, Read
 from deadtime.estimation.methods._method import Run
 from deadtime.loops import ControlLoop
 
-#: Fewest samples of a tail, and the smallest share of the step that is not rounding.
-FEWEST, LEAST = 5, 1e-6
+#: Fewest samples of a tail.
+FEWEST = 5
 
 
 @dataclass(frozen=True)
@@ -72,17 +70,13 @@ class Decay(OfOne):
         """Read the numbers from the window of one recording."""
         loop, simulated = run.loop, SimulatedRecording(*run[:3])
         stiffness = stiffness_of(loop, "decay")
-        reading, extremes = read_decaying_step(
-            simulated.recording,
-            "the output overshoots, so the rightmost roots are complex and the tail is not an "
-            "exponential. Use method='decrement', 'overshoot' or 'waveform'",
-        )
+        reading, extremes = read_decaying_step(simulated.recording, "decay")
         if extremes:
             raise NotIdentifiableError(
                 "the output overshoots, so the rightmost roots are complex, and the tail "
                 "is not an exponential. Use method='decrement', 'overshoot' or 'waveform'"
             )
-        rate, error, samples = _rate(reading, _begin(reading, loop, self.tail))
+        rate, error, samples = _rate(reading, loop, self.tail)
         lag = loop.parameters["lag"]
 
         if lag * rate >= 1.0:
@@ -123,41 +117,22 @@ class Decay(OfOne):
         )
 
 
-def _begin(reading: StepReading, loop: ControlLoop, share: float) -> float:
-    """Time after the step from which the error is below the share and no command was limited."""
-    left = 1.0 - reading.travelled
-    above = np.flatnonzero(left > share)
-    begin = float(reading.since[above[-1] + 1]) if above[-1] + 1 < left.size else math.inf
+def _rate(reading: StepReading, loop: ControlLoop, share: float) -> tuple[float, float, int]:
+    """Rate of the tail, where no command was limited, its standard error and number of samples."""
+    most = math.inf
     if loop.limit is not None:
         most = loop.limit / (loop.parameters["Kp"] * abs(reading.size))
-        limited = np.flatnonzero(left > most)
-        if limited.size:
-            # The first movement of the output is an upper bound of the delay.
-            moved = reading.travelled > max(CLEARANCE * reading.noise, LEAST)
-            begin = max(begin, float(reading.since[limited[-1]] + reading.since[np.argmax(moved)]))
-    return begin
-
-
-def _rate(reading: StepReading, begin: float) -> tuple[float, float, int]:
-    """Rate of an exponential from `begin` on, its standard error and the number of samples."""
-    rows = reading.since >= begin
-    # Errors below rounding hold no information.
-    rows &= np.maximum.accumulate((1.0 - reading.travelled)[::-1])[::-1] > LEAST * 1e-3
-    time, left = reading.since[rows], 1.0 - reading.travelled[rows]
-    if time.size < FEWEST:
+    clear = CLEARANCE * reading.noise
+    count, tail = step_tail(reading.since, reading.travelled, share, most, clear, FEWEST)
+    if tail is None:
         raise NotIdentifiableError(
-            f"the tail has {time.size} samples, but the method needs {FEWEST}: sample "
+            f"the tail has {count} samples, but the method needs {FEWEST}: sample "
             "faster, record longer, or begin the tail earlier with a larger `tail`"
         )
-    time = time - time[0]
-    clear = left > max(CLEARANCE * reading.noise, 0.2 * float(left[0]))
-    first = max(2, int(np.argmin(clear)) if not clear.all() else left.size)
-    guess = -np.polyfit(time[:first], np.log(np.abs(left[:first]) + LEAST * 1e-6), 1)[0]
-
-    height, rate, error = tail_rate(time, left, max(guess, 1e-3))
+    height, rate, error = tail
     if height <= 0.0 or rate <= 0.0 or rate < CLEARANCE * error:
         raise NotIdentifiableError(
             f"the tail decays at {rate:.3g} ± {error:.2g} 1/s, so the rate may be zero. "
             "Begin the tail earlier with a larger `tail`, or use method='waveform'"
         )
-    return rate, error, int(time.size)
+    return rate, error, count

@@ -4,22 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 
-from deadtime._base.arrays import Indices, Mask
+import deadtime.estimation._native as native
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.verdicts import verdict_if
-from deadtime.estimation._native import (
-    FlightFit,
-    FlightProfile,
-    FlightRows,
-    FreeNumbers,
-    RoundedPeak,
-    RoundedReadings,
-)
 from deadtime.estimation._result import REASONS, CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import LEAST_GAIN, standard_errors
 from deadtime.estimation.fit._least_squares import JointModel, Model
@@ -30,16 +23,13 @@ from deadtime.estimation.methods._conclusion import COLOURED, advice
 from deadtime.estimation.methods._method import Run
 from deadtime.experiments import FlightNoise
 
-#: Ratio of the residuals to those of least squares from which the noise stands for the plant.
-LESS = 1.5
-
 
 def profile_for(
-    fit: FlightFit,
+    fit: native.FlightFit,
     intervals: Literal["all", "sum"] = "all",
     covariance: Sequence[float] | None = None,
-    numbers: FreeNumbers | None = None,
-) -> FlightProfile:
+    numbers: native.FreeNumbers | None = None,
+) -> native.FlightProfile:
     """The profile over what is fitted, and over the sum of delay and lag.
 
     With the covariance of a fit whose commands are functions of its plant, or with numbers that
@@ -61,7 +51,7 @@ def concluded_flight(
     method: str,
     names: tuple[str, ...],
     runs: Sequence[Run],
-    profile: FlightProfile,
+    profile: native.FlightProfile,
     message: str,
     details: Mapping[str, Any],
     adequacy: Adequacy,
@@ -87,6 +77,9 @@ def concluded_flight(
         for what in ("rows", "commands")
         if (times := fit.scatter(what == "rows"))
     }
+    ending = f"; {unseen_in_words(unseen)} have been seen"
+    if adequacy.reasons:
+        ending = f"{REASONS}{'; '.join(adequacy.reasons)}{advice(names, runs[0].loop)}"
     labels = (*names, *(["initial output"] if fit.runs[0].offset else []))
     labels += ("trim",) * fit.trim
     return DelayEstimate(
@@ -100,9 +93,7 @@ def concluded_flight(
         residuals=fitted[0].residuals,
         whiteness=adequacy.whiteness,
         verdict=verdict_if(not adequacy.reasons),
-        message=_message(
-            message, names, held, noise[0], left_out, scatter, adequacy, runs[0], unseen
-        ),
+        message="; ".join([message, str(noise[0]), *_remarks(left_out, scatter, held)]) + ending,
         details={**details, "rows_left_out": left_out, "unseen_lag": unseen, **scatter},
         others=fitted[1:],
         noise=noise[0],
@@ -110,30 +101,15 @@ def concluded_flight(
     )
 
 
-def _noise_of(fit: FlightFit, run: int) -> FlightNoise:
-    one, (trim, white) = fit.numbers.noise[run], fit.trim_and_white(run)
-    return FlightNoise(
-        white=white,
-        air=white * one.air,
-        air_time=one.air_time if one.air > 0.0 else math.inf,
-        trim=trim,
-        sensor=white * one.sensor,
-        sensor_time=one.sensor_time if one.sensor > 0.0 else 0.0,
-    )
+def _noise_of(fit: native.FlightFit, run: int) -> FlightNoise:
+    white, air, air_time, *others = fit.noise_in_units(run)
+    return FlightNoise(white, air, air_time, 0.0, *others)
 
 
-def gain_is_certain(profile: FlightProfile) -> bool:
+def gain_is_certain(profile: native.FlightProfile) -> bool:
     """Whether the gain is fitted and far from zero."""
     error = dict(profile.stderr).get("gain", math.inf)
     return abs(profile.fit.gain) > 2.0 * LEAST_GAIN * error
-
-
-def explains_less(fit: FlightFit, white: FlightFit) -> bool:
-    """Whether the plant beside the noise explains far less of a recording than by least squares."""
-    return any(
-        float(np.std(part.residuals)) > LESS * float(np.std(least.residuals))
-        for part, least in zip(fit.parts, white.parts, strict=True)
-    )
 
 
 def without_the_plant(plain: DelayEstimate, adequacy: Adequacy) -> DelayEstimate:
@@ -147,46 +123,22 @@ def without_the_plant(plain: DelayEstimate, adequacy: Adequacy) -> DelayEstimate
     return replace(plain, verdict="indication", message=text + advice(plain.free, plain.loop))
 
 
-def _message(
-    done: str,
-    names: tuple[str, ...],
-    held: list[str],
-    noise: FlightNoise,
-    left_out: int,
-    scatter: Mapping[str, float],
-    adequacy: Adequacy,
-    run: Run,
-    unseen: float,
-) -> str:
-    text = f"{done}; {noise}"
-    if left_out:
-        text += f"; {left_out} rows were left out as outliers"
-    for what, size in scatter.items():
-        text += (
-            f"; the time stamps of the {what.removeprefix('scatter_of_')} have random errors with "
-            f"a standard deviation of {size:.2g} s"
-        )
-    if held:
-        text += f"; the {' and '.join(held)} was estimated as zero, which is its bound"
-    if adequacy.reasons:
-        return f"{text}{REASONS}{'; '.join(adequacy.reasons)}{advice(names, run.loop)}"
-    return f"{text}; {unseen_in_words(unseen)} have been found"
-
-
-def rounding_is_all(fit: FlightFit) -> bool:
-    """Whether every recording is rounded, and has no other noise than white beside."""
-    return all(
-        rows.rounding > 0.0 and not (one.air or one.sensor or one.stamps or one.arrivals)
-        for rows, one in zip(fit.runs, fit.numbers.noise, strict=True)
+def _remarks(left_out: int, scatter: Mapping[str, float], held: list[str]) -> list[str]:
+    """What was left out, and what came out, in words."""
+    said = [f"{left_out} rows were left out as outliers"] if left_out else []
+    said += [
+        f"the time stamps of the {what.removeprefix('scatter_of_')} have random errors with "
+        f"a standard deviation of {size:.2g} s"
+        for what, size in scatter.items()
+    ]
+    return (
+        [*said, f"the {' and '.join(held)} was estimated as zero, which is its bound"]
+        if held
+        else said
     )
 
 
-def read_as_intervals(
-    estimate: DelayEstimate,
-    models: Sequence[CommandedModel],
-    first: Sequence[FlightRows],
-    repeated: Sequence[Indices],
-) -> DelayEstimate:
+def read_as_intervals(estimate: DelayEstimate, models: Sequence[CommandedModel]) -> DelayEstimate:
     """The estimate with each row as the interval that was rounded to it.
 
     Parameters
@@ -194,21 +146,15 @@ def read_as_intervals(
     estimate : DelayEstimate
         That of one row for each step.
     models : sequence of CommandedModel
-    first : sequence of FlightRows
-        The rows before outliers were found.
-    repeated : sequence of ndarray
-        Rows of each recording that repeat the one before.
+        With the rows before outliers were found, and those that repeat the one before.
     """
     profile = estimate._profile
-    assert isinstance(profile, FlightProfile)
+    assert isinstance(profile, native.FlightProfile)
     fit = profile.fit
     parts = tuple(one.started(fit, {}) for one in models)
     model: Model = parts[0] if len(parts) == 1 else JointModel(parts, (1.0,) * len(parts))
-    readings = RoundedReadings(
-        np.concatenate([one.recording.output for one in parts]),
-        np.repeat(np.arange(len(parts)), model.sizes),
-        np.concatenate([_read(*each) for each in zip(first, fit.runs, repeated, strict=True)]),
-        [rows.rounding for rows in fit.runs],
+    readings = native.RoundedReadings.of_rows(
+        [one.rows for one in models], fit.runs, [one.repeated for one in models]
     )
     names, count = estimate.free, len(estimate.free)
     start = np.concatenate([parts[0].start[:count], *(one.start[count:] for one in parts)])
@@ -236,7 +182,7 @@ def read_as_intervals(
         details={**estimate.details, "initial_output": parts[0].start_of(peak.point)},
         others=runs[1:],
         _profile=Profile(
-            RoundedCost(model, readings, peak, runs[0].loop.parameters, freedom),
+            partial(_rounded_cost, model, readings, peak, runs[0].loop.parameters, freedom),
             best=float(freedom),
             freedom=freedom,
             widening=unseen,
@@ -245,25 +191,19 @@ def read_as_intervals(
     )
 
 
-def _read(first: FlightRows, fitted: FlightRows, repeated: Indices) -> Mask:
-    """Rows that are read as intervals: all but outliers and those that repeat the one before."""
-    mask = ~(first.used & ~fitted.used)
-    mask[repeated] = False
-    return mask
+def _rounded_cost(
+    model: Model,
+    readings: native.RoundedReadings,
+    peak: native.RoundedPeak,
+    known: Mapping[str, float],
+    freedom: int,
+    name: str,
+    value: float,
+) -> float:
+    """-2 ln L with one quantity held, as the cost of a `Profile` whose variance is one.
 
-
-@dataclass(frozen=True)
-class RoundedCost:
-    """-2 ln L with one quantity held, as the cost of a `Profile` whose variance is one."""
-
-    model: Model
-    readings: RoundedReadings
-    peak: RoundedPeak
-    known: Mapping[str, float]
-    freedom: int
-
-    def __call__(self, name: str, value: float) -> float:
-        """The rise, on top of what a sum of squares has at its least."""
-        held = places_of(name, value, self.model, self.known)
-        least = self.model.problem.rounded_held(self.readings, self.peak, *held)
-        return self.freedom + max(0.0, least - self.peak.value)
+    It is the rise, on top of what a sum of squares has at its least.
+    """
+    held = places_of(name, value, model, known)
+    least = model.problem.rounded_held(readings, peak, *held)
+    return freedom + max(0.0, least - peak.value)

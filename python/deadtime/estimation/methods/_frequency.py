@@ -45,7 +45,7 @@ from deadtime.estimation.data._checks import (
 from deadtime.estimation.data._periodic import Periods, whole_periods
 from deadtime.estimation.data._simulated import commands_over_samples
 from deadtime.estimation.fit._least_squares import Ends, Minimum, ModelOfOne, place_of
-from deadtime.estimation.fit._profile import Profile, ProfileCost
+from deadtime.estimation.fit._profile import Profile, least_cost
 from deadtime.estimation.fit._residuals import whiteness_of
 from deadtime.estimation.methods._conclusion import OfOne, Read, is_rounding
 from deadtime.estimation.methods._method import Run
@@ -154,7 +154,7 @@ class Frequency(OfOne):
             ),
             details={"lines": lines.describe, "command": source, "p_value_of_model": p_value},
             profile=Profile(
-                cost=ProfileCost(lines, fit, known),
+                cost=partial(least_cost, lines, fit, known),
                 best=fit.cost,
                 freedom=lines.freedom,
                 widening=dict.fromkeys(errors, math.sqrt(wider / scale) if scale > 0.0 else 1.0),

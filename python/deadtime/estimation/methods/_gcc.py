@@ -23,14 +23,8 @@ import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import correlation_coefficient, correlation_peak
-from deadtime.estimation.data._input_output import (
-    FEEDBACK,
-    InputOutput,
-    feedback_p_value,
-    read_input_output,
-)
+from deadtime.estimation.data._input_output import InputOutput, first_shift, read_input_output
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.data._step_reading import check_decays, read_ringing
 from deadtime.estimation.methods._conclusion import OfOne, Read
 from deadtime.estimation.methods._method import Run, check_choice
 
@@ -78,12 +72,8 @@ class GCC(OfOne):
                 "perhaps because of its limit, so its correlation has "
                 "no peak. Use a smaller step, or method='output_error'"
             )
-        p_value = feedback_p_value(data)
-        feedback = p_value < FEEDBACK
-        if feedback:
-            check_decays(read_ringing(data), "gcc")
-        # Feedback within the same sample makes a peak at shift zero.
-        least = 1 if feedback else 0
+        p_value, least = first_shift(data, "gcc")
+        feedback = bool(least)
         gain = float(loop.parameters.get("gain", 1.0))
         shift, between = correlation_peak(
             read.command, np.sign(gain) * read.response, self.weighting, (least, read.longest)

@@ -22,10 +22,8 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
-import numpy as np
-
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._native import rise_tangent
+from deadtime.estimation._native import first_movement, line_through, rise_tangent
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import (
     CLEARANCE,
@@ -114,14 +112,8 @@ class Graphical(OfOne):
 
 def _first_movement(reading: StepReading) -> int:
     """Row of the first sample from which on the output stays above the noise."""
-    least = max(CLEARANCE * reading.noise, LEAST)
-    still = np.flatnonzero(reading.travelled <= least)
-    moved = int(still[-1]) + 1 if still.size else 0
-    # An unstable response returns to the start later: take its first movement.
-    half = int(np.argmax(reading.travelled >= 0.5))
-    if moved > half:
-        moved = int(np.flatnonzero(reading.travelled[:half] <= least)[-1]) + 1 if half else 0
-    if moved == 0 or moved >= reading.travelled.size:
+    moved = first_movement(reading.travelled, max(CLEARANCE * reading.noise, LEAST))
+    if moved is None:
         raise NotIdentifiableError(
             f"the output moves within the first sample after the step at {reading.step.time:g} "
             "s, or not at all, so no delay can be read. Use method='waveform'"
@@ -136,12 +128,7 @@ def _two_point(reading: StepReading, low: float, high: float) -> float:
             f"the smaller of `shares`, {low:g}, is too close to the noise, which is "
             f"{reading.noise:.2g} of the step. Give larger `shares`, or a larger step"
         )
-    times = []
-    for share in (low, high):
-        row = int(np.argmax(reading.travelled >= share))
-        pair = slice(row - 1, row + 1)
-        times.append(float(np.interp(share, reading.travelled[pair], reading.since[pair])))
-    return times[0] - (times[1] - times[0]) * low / (high - low)
+    return line_through(reading.since, reading.travelled, (low, high))
 
 
 def _tangent(reading: StepReading, moved: int, held: float | None) -> tuple[float, float]:

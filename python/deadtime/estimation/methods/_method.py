@@ -5,10 +5,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, TypeAlias
+from typing import ClassVar, NamedTuple, TypeAlias
 
-from deadtime._base.validation import OpenRange, finite, is_range, open_interval
+from deadtime._base.validation import OpenRange, finite, open_interval
 from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.data._given import given_recordings, one_each
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording, RecordingCheck
 
@@ -37,19 +38,9 @@ class Run(NamedTuple):
 
 def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> list[Run]:
     """Pair recordings with loops and windows; a single loop or window applies to all."""
-    recordings = list(recording) if isinstance(recording, (list, tuple)) else [recording]
-    if not recordings:
-        raise ValueError("no recording was given: give a recording, or a list of recordings")
-    number = len(recordings)
-    loops = list(loop) if isinstance(loop, (list, tuple)) else [loop] * number
-    windows: list[Any] = [window] * number
-    if isinstance(window, (tuple, list)) and not (is_range(window) and len(window) == 2):
-        windows = list(window)
-    for name, given in (("loop", loops), ("window", windows)):
-        if len(given) != number:
-            raise ValueError(
-                f"{number} recordings and {len(given)} of `{name}`: give one for all, or one each"
-            )
+    recordings = given_recordings(recording)
+    loops = one_each("loop", loop, len(recordings))
+    windows = one_each("window", window, len(recordings))
     runs = []
     for index, (one, its_loop, ends) in enumerate(zip(recordings, loops, windows, strict=True)):
         if not isinstance(one, Recording):

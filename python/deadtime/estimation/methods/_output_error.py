@@ -13,20 +13,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, ClassVar, Literal, NamedTuple
 
-import numpy as np
-
+import deadtime.estimation._native as native
+import deadtime.estimation.methods._flight_conclusion as flight
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._native import (
-    LONGEST_DELAY,
-    MOST_NUMBERS,
-    FlightFit,
-    FlightPlant,
-    FlightProfile,
-    FlightRows,
-)
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
-from deadtime.estimation.data._known_filter import KnownFilter
+from deadtime.estimation.data._known_filter import GivenFilter, known_filter
 from deadtime.estimation.data._stamps import on_regular_times
 from deadtime.estimation.fit._least_squares import Minimum, Model, solve_jointly
 from deadtime.estimation.likelihood._judgement import Adequacy, adequacy_of
@@ -38,18 +30,8 @@ from deadtime.estimation.methods._conclusion import (
     is_exact,
     without_vanishing,
 )
-from deadtime.estimation.methods._flight_conclusion import (
-    concluded_flight,
-    explains_less,
-    gain_is_certain,
-    profile_for,
-    read_as_intervals,
-    rounding_is_all,
-    without_the_plant,
-)
 from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
 from deadtime.loops import ControlLoop
-from deadtime.recordings import RecordingCheck
 
 #: Residuals of a first fit below which, as a share of the range of the output, all may be rounding.
 NEARLY_EXACT = 1e-4
@@ -96,7 +78,7 @@ class OutputError(Method):
     """
 
     initial_output: float | None = None
-    output_filter: tuple[Sequence[float], Sequence[float]] | None = None
+    output_filter: GivenFilter | None = None
     air: Literal["command", "vehicle"] = "command"
     intervals: Literal["all", "sum"] = "all"
     rivals: bool = True
@@ -108,12 +90,11 @@ class OutputError(Method):
         check_initial_output(self.initial_output)
         check_choice("air", self.air, ("command", "vehicle"))
         check_choice("intervals", self.intervals, ("all", "sum"))
-        if self.output_filter is not None:
-            KnownFilter.of(self.output_filter)
+        known_filter(self.output_filter)
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the response of the plant to the logged commands."""
-        known = None if self.output_filter is None else KnownFilter.of(self.output_filter)
+        known = known_filter(self.output_filter)
         if self.air == "vehicle" and not all(
             plant_model(r.loop.plant, ()).integrates for r in runs
         ):
@@ -128,10 +109,7 @@ class OutputError(Method):
 
 
 def estimate_from_commands(
-    method: str,
-    runs: Sequence[Run],
-    free: Sequence[str],
-    assumed: Assumed,
+    method: str, runs: Sequence[Run], free: Sequence[str], assumed: Assumed
 ) -> DelayEstimate:
     """Fit the response to the command: logged, or computed from the recorded output.
 
@@ -154,7 +132,7 @@ def estimate_from_commands(
 def _criterion(estimate: DelayEstimate) -> float:
     """Akaike's criterion of a fit with noise; infinite of least squares."""
     profile = estimate._profile
-    return profile.fit.criterion if isinstance(profile, FlightProfile) else math.inf
+    return profile.fit.criterion if isinstance(profile, native.FlightProfile) else math.inf
 
 
 def _estimated(
@@ -210,8 +188,6 @@ class _Begun:
     names : _Names
     assumed : Assumed
     models : list of CommandedModel
-    rows : list of FlightRows
-    checks : list of RecordingCheck or None
     white : NoiseFit
         The fit to parts of the rows.
     numbers : dict of str to float
@@ -225,11 +201,9 @@ class _Begun:
     names: _Names
     assumed: Assumed
     models: list[CommandedModel]
-    rows: list[FlightRows]
-    checks: list[RecordingCheck | None]
-    white: FlightFit
+    white: native.FlightFit
     numbers: dict[str, float]
-    whole: FlightFit
+    whole: native.FlightFit
 
     @property
     def criterion(self) -> float:
@@ -275,7 +249,7 @@ class _Begun:
     @property
     def is_exact(self) -> bool:
         """Whether least squares leaves rounding alone."""
-        nearly = self.names.are_common and _is_nearly_exact(self.whole, self.models)
+        nearly = self.names.are_common and self.whole.leaves_less_than(NEARLY_EXACT)
         return nearly and is_exact(*self.plain, self.fitted)
 
     def by_least_squares(self) -> DelayEstimate:
@@ -289,7 +263,7 @@ class _Begun:
 class _Likeliest(NamedTuple):
     """The likeliest plant and noise, doubts about its commands, and the recordings with it."""
 
-    profile: FlightProfile
+    profile: native.FlightProfile
     doubts: tuple[str, ...]
     fitted: list[Run]
 
@@ -313,7 +287,7 @@ def _likeliest(begun: _Begun) -> _Likeliest:
     if any(one.commands.are_computed for one in models):
         commands = [one.commands for one in models]
         fit, unclear, covariance = fit.between_rows(commands, not begun.numbers)
-    profile = profile_for(fit, begun.assumed.intervals, covariance, numbers)
+    profile = flight.profile_for(fit, begun.assumed.intervals, covariance, numbers)
     doubts = (
         "rows are further apart than samples, and the recording does "
         "not show at which times between rows the reference changes",
@@ -321,31 +295,31 @@ def _likeliest(begun: _Begun) -> _Likeliest:
     return _Likeliest(profile, doubts * unclear, fitted)
 
 
-def _check_delay(begun: _Begun, profile: FlightProfile) -> None:
+def _check_delay(begun: _Begun, profile: native.FlightProfile) -> None:
     """Refuse a fit at the longest delay, and one that explains hardly more than a constant does."""
-    longest = min(LONGEST_DELAY * one.span for one in begun.models)
+    longest = min(native.LONGEST_DELAY * one.span for one in begun.models)
     if "delay" in begun.names.free and profile.fit.numbers.delay >= longest * (1.0 - 1e-3):
         raise NotIdentifiableError(
             f"the search ends at its longest delay, {longest:g} s, which is "
-            f"{LONGEST_DELAY:g} of the window. So the output is not a response "
+            f"{native.LONGEST_DELAY:g} of the window. So the output is not a response "
             "to this command. Check columns and units, or choose a longer window"
         )
-    if not gain_is_certain(profile):
+    if not flight.gain_is_certain(profile):
         check_fit(*begun.plain, begun.fitted)
 
 
 def _without_the_plant(
-    begun: _Begun, profile: FlightProfile, adequacy: Adequacy
+    begun: _Begun, profile: native.FlightProfile, adequacy: Adequacy
 ) -> DelayEstimate | None:
     """The estimate of least squares where the noise stands for what the plant lacks."""
-    astray = adequacy.reasons and explains_less(profile.fit, begun.whole)
+    astray = adequacy.reasons and profile.fit.explains_less(begun.whole)
     if not (begun.names.are_common and (adequacy.plant_lacks or astray)):
         return None
     try:
-        return without_the_plant(begun.by_least_squares(), adequacy)
+        return flight.without_the_plant(begun.by_least_squares(), adequacy)
     except NotIdentifiableError:
         # Where air moves the output far more than the command does, least squares sees nothing.
-        if not gain_is_certain(profile):
+        if not flight.gain_is_certain(profile):
             raise
     return None
 
@@ -356,7 +330,7 @@ def _concluded(begun: _Begun, found: _Likeliest, adequacy: Adequacy) -> DelayEst
     if adequacy.coloured:
         profile = profile.coloured()
         message += ", with wider intervals because the residuals are coloured also at rest"
-    estimate = concluded_flight(
+    estimate = flight.concluded_flight(
         begun.method,
         begun.names.linear,
         found.fitted,
@@ -370,10 +344,9 @@ def _concluded(begun: _Begun, found: _Likeliest, adequacy: Adequacy) -> DelayEst
         plain
         and not profile.fit.is_long
         and estimate.verdict == "reliable"
-        and rounding_is_all(profile.fit)
+        and profile.fit.is_rounding_alone
     ):
-        repeated = [np.empty(0, int) if one is None else one.repeated for one in begun.checks]
-        return read_as_intervals(estimate, begun.models, begun.rows, repeated)
+        return flight.read_as_intervals(estimate, begun.models)
     return estimate
 
 
@@ -390,24 +363,21 @@ def _begun_with(method: str, runs: Sequence[Run], names: _Names, assumed: Assume
     """Least squares on recordings whose commands are as `assumed`."""
     models = [commanded_model(run, names.common, assumed) for run in runs]
     _check_others(names.others, models[0].known)
-    checks = [run.check if assumed.output_filter is None else None for run in runs]
-    rows = [
-        one.rows(assumed.initial_output, check) for one, check in zip(models, checks, strict=True)
-    ]
-    given, known = partial(_given, names, assumed, models, rows), models[0].known
+    rows, known = [one.rows for one in models], models[0].known
+    given = partial(_given, names, assumed, models, rows)
     first = [known[name] for name in names.others]
-    white, found = FlightFit.first(given, first, known["delay"], known["gain"])
+    white, found = native.FlightFit.first(given, first, known["delay"], known["gain"])
     numbers = dict(zip(names.others, found, strict=True))
     whole = white.on(given(found)[1])
-    return _Begun(method, runs, names, assumed, models, rows, checks, white, numbers, whole)
+    return _Begun(method, runs, names, assumed, models, white, numbers, whole)
 
 
 def _check_others(names: Sequence[str], known: Mapping[str, float]) -> None:
     """Refuse numbers that cannot be searched around the rest."""
-    if len(names) > MOST_NUMBERS:
+    if len(names) > native.MOST_NUMBERS:
         raise ValueError(
             f"besides gain, delay, lags and zero, the plant has {len(names)} free "
-            f"parameters ({', '.join(names)}): fit at most {MOST_NUMBERS} of them"
+            f"parameters ({', '.join(names)}): fit at most {native.MOST_NUMBERS} of them"
         )
     for name in names:
         if known[name] == 0.0:
@@ -420,20 +390,12 @@ def _given(
     names: _Names,
     assumed: Assumed,
     models: Sequence[CommandedModel],
-    rows: Sequence[FlightRows],
+    rows: Sequence[native.FlightRows],
     found: Sequence[float],
-) -> tuple[FlightPlant, list[FlightRows]]:
+) -> tuple[native.FlightPlant, list[native.FlightRows]]:
     """The plant with such other numbers, and the rows with the commands that it gets."""
     plant, values = models[0].plant, dict(zip(names.others, found, strict=True))
     if values:
         plant = plant._replace({**plant.parameters, **values})
     within = [one.limited(part, values) for one, part in zip(models, rows, strict=True)]
     return plant_model(plant, names.linear, assumed.air == "vehicle"), within
-
-
-def _is_nearly_exact(fit: FlightFit, models: Sequence[CommandedModel]) -> bool:
-    """Whether all that is left may be rounding."""
-    return all(
-        float(np.max(np.abs(part.residuals))) <= NEARLY_EXACT * float(np.ptp(one.recording.output))
-        for part, one in zip(fit.parts, models, strict=True)
-    )

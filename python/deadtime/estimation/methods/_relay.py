@@ -15,23 +15,16 @@ drift cancels to first order; the standard error is that of the mean of these cy
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from deadtime._base.arrays import Array, Indices
+import deadtime.estimation._native as native
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
-from deadtime.estimation._native import (
-    HeldResponse,
-    cycle_crossings,
-    cycle_delay_by_lag,
-    cycle_delays,
-    cycle_switches,
-)
 from deadtime.estimation.data._checks import integrator_of
 from deadtime.estimation.data._step_reading import noise_of_second_differences
 from deadtime.estimation.methods._conclusion import OfOne, Read
@@ -89,23 +82,25 @@ class Relay(OfOne):
         error = data.output - data.reference
         # Second differences of straight lines are noise, except at the corners.
         noise = noise_of_second_differences(error)
-        crossings = cycle_crossings(data.time, error, noise)[LEFT_OUT:]
+        crossings = native.cycle_crossings(data.time, error, noise)[LEFT_OUT:]
         _check_cycle(crossings, error, data.time)
         switches = _switches(data.time, signs, crossings, loop.is_sampled)
         half = float(np.mean(np.diff(crossings)))
-        count, mean, stderr = cycle_delays(crossings, switches)
-        delay = mean - cycle_delay_by_lag(plant.lag, half)
+        count, mean, stderr = native.cycle_delays(crossings, switches)
+        delay = mean - native.cycle_delay_by_lag(plant.lag, half)
         if delay <= 0.0:
             raise NotIdentifiableError(
                 f"lag and hold explain a quarter of the period, {0.5 * half:.3g} s. "
                 f"So the lag is shorter than {plant.lag:g} s, or there is no delay"
             )
-        rows, path, output = _path(data, switches, delay, plant.lag)
-        first, last = data.time[rows[[0, -1]]]
-        fitted = float(path @ output) / float(path @ path)
+        columns = data.time, data.output, data.reference
+        found = native.cycle_path(columns, switches, delay, plant.lag)
+        assert found is not None  # there are rows between the first and the last crossing
+        ends, path, output, fitted = found
+        first, last = data.time[ends].tolist()
         slope = abs(plant.gain) * height if height is not None else abs(fitted)
         waits = float(np.mean(switches - crossings[:-1]))
-        peaks = _peaks(data.time, error, crossings)
+        peaks = native.cycle_peaks(data.time, error, crossings)
         return Read(
             {"delay": delay},
             stderr,
@@ -128,7 +123,7 @@ class Relay(OfOne):
                 "amplitude_expected": slope * (delay + waits),
                 "slope": abs(fitted),
             },
-            recording=data.window(float(first), float(last)),
+            recording=data.window(first, last),
             residuals=output - math.copysign(slope, fitted) * path,
         )
 
@@ -166,7 +161,7 @@ def _check_cycle(crossings: Array, error: Array, time: Array) -> None:
             f"{float(halves.min()):.3g} to {float(halves.max()):.3g} s. "
             "So this is noise or a changing reference, not a limit cycle"
         )
-    peaks = _peaks(time, error, crossings)
+    peaks = native.cycle_peaks(time, error, crossings)
     if peaks[-1] < SHRINKING * peaks[0]:
         raise NotIdentifiableError(
             f"the oscillation decays from {peaks[0]:.3g} to {peaks[-1]:.3g}, so no "
@@ -174,19 +169,11 @@ def _check_cycle(crossings: Array, error: Array, time: Array) -> None:
         )
 
 
-def _peaks(time: Array, error: Array, crossings: Array) -> Array:
-    """Largest error between each crossing and the next."""
-    rows = np.searchsorted(time, crossings)
-    return np.array(
-        [float(np.max(np.abs(error[low:high]))) for low, high in itertools.pairwise(rows)]
-    )
-
-
 def _switches(time: Array, signs: Array, crossings: Array, sampled: bool) -> Array:
     """Time of the switch at each crossing but the last; the crossing itself without samples."""
     if not sampled:
         return crossings[:-1]
-    counts, times = cycle_switches(time, signs, crossings)
+    counts, times = native.cycle_switches(time, signs, crossings)
     for count, crossing in zip(counts, crossings, strict=False):
         if count % 2 == 0:
             raise NotIdentifiableError(
@@ -195,20 +182,3 @@ def _switches(time: Array, signs: Array, crossings: Array, sampled: bool) -> Arr
                 "the command does not come from a relay. Use a larger relay"
             )
     return np.array(times)
-
-
-def _path(
-    data: Recording, switches: Array, delay: float, lag: float
-) -> tuple[Indices, Array, Array]:
-    """Rows from the second switch on; the unit path caused by the switches, and the output there.
-
-    Path and output are about their means.
-    """
-    begin, end = switches[1] + delay, switches[-1] + delay
-    rows = np.flatnonzero((data.time >= begin) & (data.time <= end))
-    first = -1.0 if data.output[rows[0]] > data.reference[rows[0]] else 1.0
-    values = np.full(switches.size, first)
-    values[::2] = -first
-    path = HeldResponse(switches, values).at(data.time[rows] - delay, lag).value
-    output = data.output[rows]
-    return rows, path - path.mean(), output - output.mean()

@@ -23,6 +23,7 @@ from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
+import deadtime.estimation.fit._least_squares as least_squares
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import FlightProfile, LoopMisfit
 from deadtime.estimation._result import DelayEstimate
@@ -37,12 +38,6 @@ from deadtime.estimation.data._checks import (
     start_and_span,
 )
 from deadtime.estimation.data._simulated import SimulatedRecording, shortest_time
-from deadtime.estimation.fit._least_squares import (
-    Ends,
-    ModelOfOne,
-    solve_jointly,
-    without_vanishing,
-)
 from deadtime.estimation.methods._commanded_model import Assumed
 from deadtime.estimation.methods._conclusion import concluded
 from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
@@ -123,8 +118,8 @@ class Waveform(Method):
     def _by_simulation(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         names = checked_names(free, runs[0].loop, LOOP_PARAMETERS)
         models = [simulated_model(run, names, self.initial_output) for run in runs]
-        model, found = solve_jointly(models)
-        found = without_vanishing(model, found)
+        model, found = least_squares.solve_jointly(models)
+        found = least_squares.without_vanishing(model, found)
         check_ends(names, found.point, model.low, model.high)
         return concluded(
             self.name,
@@ -156,7 +151,7 @@ def _unlikelihood(fit: DelayEstimate) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class SimulatedModel(ModelOfOne):
+class SimulatedModel(least_squares.ModelOfOne):
     """The misfit of the simulated loop, bounded where simulations diverge."""
 
     simulated: SimulatedRecording
@@ -167,7 +162,7 @@ class SimulatedModel(ModelOfOne):
         """The misfit of the kernel."""
         return self.simulated.misfit(self.names, self.offset, self.size)
 
-    def ends(self, label: str) -> Ends:
+    def ends(self, label: str) -> least_squares.Ends:
         """Bounds and starting values of one of the parameters."""
         recording, loop = self.recording, self.simulated.loop
         start, span = start_and_span(recording)
@@ -176,17 +171,17 @@ class SimulatedModel(ModelOfOne):
             shortest, lag = 0.0, self.least_lag * recording.sample_time
         delays = np.geomspace(0.003, 0.6, DELAY_POINTS) * span
         found = {
-            "delay": Ends(shortest, span, delays),
-            "lag": Ends(lag, span, [0.02 * span]),
-            "start": Ends(-0.25 * span, 0.25 * span, [0.0]),
-            "initial output": Ends(-np.inf, np.inf, [start]),
+            "delay": least_squares.Ends(shortest, span, delays),
+            "lag": least_squares.Ends(lag, span, [0.02 * span]),
+            "start": least_squares.Ends(-0.25 * span, 0.25 * span, [0.0]),
+            "initial output": least_squares.Ends(-np.inf, np.inf, [start]),
         }.get(label)
         if found is not None:
             return found
         value = loop.parameters[label]
         low, high = sorted((1e-3 * value, 1e3 * value))
         factors = np.array(GAIN_FACTORS) if label == "gain" else np.ones(1)
-        return Ends(low, high, factors * value)
+        return least_squares.Ends(low, high, factors * value)
 
 
 def simulated_model(

@@ -23,7 +23,7 @@ from deadtime.estimation.methods._grid import Grid
 from deadtime.estimation.methods._method import Method
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._waveform import Waveform
-from deadtime.estimation.planning._monte_carlo import SLOW, MonteCarlo, run_many_times, with_sums
+from deadtime.estimation.planning._monte_carlo import SLOW, MonteCarlo, Trials, with_sums
 from deadtime.estimation.planning._planned_bound import (
     PlannedBound,
     bound_with_command,
@@ -155,17 +155,14 @@ class Identifiability(ReadOnlyArrays, Pictured):
         if known is None:
             known = self.loop.replace(delay=None) if "delay" in self.free else self.loop
         informed = self._informed(method_of(method, [self.recording]))
-        return run_many_times(
-            informed.name,
-            self.loop,
+        trials = Trials(
+            with_sums(self.loop),
             partial(self.experiment.run, self.loop, self.noise, noise_in_loop=noise_in_loop),
             partial(estimate_delay, loop=known, method=informed, free=self.free),
-            runs,
             seed,
             level,
-            processes,
-            progress,
         )
+        return trials.run(informed.name, runs, processes, progress)
 
     def _informed(self, method: Method) -> Method:
         """The method, with the output at the start where that is known and it has the option."""
@@ -344,15 +341,7 @@ def identifiability(
     if logged is None and (alone is None or run_loop.is_sampled):
         raise NotIdentifiableError("; ".join(remarks))
     return Identifiability(
-        loop,
-        experiment,
-        names,
-        noise,
-        initial_output,
-        recording,
-        logged,
-        alone,
-        tuple(remarks),
+        loop, experiment, names, noise, initial_output, recording, logged, alone, tuple(remarks)
     )
 
 

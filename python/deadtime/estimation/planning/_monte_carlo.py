@@ -8,9 +8,8 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -21,7 +20,7 @@ from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.processes import shared_out
 from deadtime._base.progress import Progress
-from deadtime._base.validation import whole_number
+from deadtime._base.validation import confidence, whole_number
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.fit._profile import unit_of
 from deadtime.loops import ControlLoop
@@ -124,50 +123,39 @@ class _Outcome(NamedTuple):
     refusal: str = ""
 
 
-def run_many_times(
-    method: str,
-    loop: ControlLoop,
-    simulate: Simulate,
-    estimate: Estimate,
-    runs: int,
-    seed: int,
-    level: float,
-    processes: int | None,
-    progress: Progress,
-) -> MonteCarlo:
-    """Simulate and estimate `runs` times, and collect the statistics."""
-    count = whole_number("runs", runs)
-    if not 0.0 < level < 1.0:
-        raise ValueError(f"level={level!r} is not between 0 and 1: give a level such as 0.95")
-    truth = with_sums(loop)
-    some = partial(_outcomes, truth, simulate, estimate, level, seed)
-    return _summed_up(method, truth, level, shared_out(some, count, processes, progress))
+class Trials(NamedTuple):
+    """How each of many runs is simulated, from one seed, and estimated, and the truth."""
 
+    truth: Mapping[str, float]
+    simulate: Simulate
+    estimate: Estimate
+    seed: int
+    level: float
 
-def _outcomes(
-    truth: Mapping[str, float],
-    simulate: Simulate,
-    estimate: Estimate,
-    level: float,
-    seed: int,
-    runs: range,
-) -> list[_Outcome]:
-    found = []
-    for i in runs:
+    def outcomes(self, runs: range) -> list[_Outcome]:
+        """The results of some of the runs."""
+        return [self._outcome(run) for run in runs]
+
+    def _outcome(self, run: int) -> _Outcome:
         # The children of one seed, as its `spawn` makes them.
-        recording = simulate(np.random.SeedSequence(seed, spawn_key=(i,)))
+        recording = self.simulate(np.random.SeedSequence(self.seed, spawn_key=(run,)))
         try:
-            fit = estimate(recording)
+            fit = self.estimate(recording)
             fitted = with_sums(fit.loop)
             values = {name: fitted[name] for name in fit.stderr}
             bounds = {} if fit.crb is None else {name: fit.crb.stderr[name] for name in values}
             held = {}
             if fit.calibrated:
-                held = {name: _holds(fit, name, truth[name], level) for name in values}
-            found.append(_Outcome(values, bounds, held))
+                held = {name: _holds(fit, name, self.truth[name], self.level) for name in values}
+            return _Outcome(values, bounds, held)
         except DeadtimeError as refusal:
-            found.append(_Outcome({}, {}, {}, str(refusal)))
-    return found
+            return _Outcome({}, {}, {}, str(refusal))
+
+    def run(self, method: str, runs: int, processes: int | None, progress: Progress) -> MonteCarlo:
+        """Simulate and estimate `runs` times, and collect the statistics."""
+        count = whole_number("runs", runs)
+        confidence(self.level)
+        return _summed_up(method, self, shared_out(self.outcomes, count, processes, progress))
 
 
 def _holds(fit: DelayEstimate, name: str, truth: float, level: float) -> bool:
@@ -195,9 +183,7 @@ def with_sums(loop: ControlLoop) -> dict[str, float]:
     return values | sums
 
 
-def _summed_up(
-    method: str, everything: Mapping[str, float], level: float, outcomes: list[_Outcome]
-) -> MonteCarlo:
+def _summed_up(method: str, trials: Trials, outcomes: list[_Outcome]) -> MonteCarlo:
     answered = [outcome for outcome in outcomes if not outcome.refusal]
     # Numbers are left out, so that equal reasons are counted together.
     refusals = [outcome.refusal for outcome in outcomes if outcome.refusal]
@@ -207,7 +193,7 @@ def _summed_up(
             f"all {len(outcomes)} runs were refused. The most "
             f"frequent reason: {reasons.most_common(1)[0][0]}"
         )
-    truth = {name: everything[name] for name in answered[0].values}
+    truth = {name: trials.truth[name] for name in answered[0].values}
     estimates = {name: np.array([one.values[name] for one in answered]) for name in truth}
     errors = {name: estimates[name] - truth[name] for name in truth}
     return MonteCarlo(
@@ -217,13 +203,13 @@ def _summed_up(
         estimates=estimates,
         rmse={name: float(np.sqrt(np.mean(error**2))) for name, error in errors.items()},
         bias={name: float(np.mean(error)) for name, error in errors.items()},
-        mean_bound={
-            name: float(np.mean([one.bounds[name] for one in answered]))
-            for name in answered[0].bounds
-        },
-        level=level,
-        coverage={
-            name: float(np.mean([one.held[name] for one in answered])) for name in answered[0].held
-        },
+        mean_bound=_means([one.bounds for one in answered]),
+        level=trials.level,
+        coverage=_means([one.held for one in answered]),
         failures=dict(reasons.most_common()),
     )
+
+
+def _means(each: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """The mean of each number over the runs."""
+    return {name: float(np.mean([one[name] for one in each])) for name in each[0]}

@@ -130,17 +130,7 @@ def estimate_of(
         )
         message = f"no estimate yet: {waits}" + (f"; {message}" if message else "")
     return OnlineEstimate(
-        time=numbers.time,
-        delay=numbers.delay,
-        ci=(max(numbers.low, 0.0), numbers.high),
-        stderr=numbers.delay_deviation,
-        lag=numbers.lag,
-        delay_plus_lag=numbers.together,
-        delay_plus_lag_ci=(max(numbers.together_low, 0.0), numbers.together_high),
-        gain=numbers.gain,
-        gain_stderr=numbers.gain_deviation,
-        informed=numbers.gate > 0.5,
-        changed=numbers.changed,
+        **numbers.shown,
         known=known,
         verdict=verdict_if(not against) if known else "none",
         message=message,

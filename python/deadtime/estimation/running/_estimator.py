@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+import deadtime.estimation.running._settings as settings
 from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.validation import finite, non_negative, positive
 from deadtime._base.verdicts import Verdict
@@ -17,17 +19,6 @@ from deadtime.estimation._native import BankAnswer, OnlineBank
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.running._estimate import OnlineEstimate, estimate_of
-from deadtime.estimation.running._settings import (
-    DELAYS,
-    LAGS,
-    BankSettings,
-    alarm_of,
-    coarser,
-    is_range,
-    lag_sets,
-    linear_plant,
-    points_of_range,
-)
 from deadtime.experiments import FlightNoise, Noise
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
@@ -161,26 +152,29 @@ class OnlineEstimator:
         level: float = 0.95,
     ) -> None:
         self._loop = loop
-        points = points_of_range("delays", delays, DELAYS)
-        self._lags = None if lags is None else points_of_range("lags", lags, LAGS)
-        model = linear_plant(loop, ("delay", "gain"))
+        points = settings.points_of_range("delays", delays, settings.DELAYS)
+        self._lags = None if lags is None else settings.points_of_range("lags", lags, settings.LAGS)
+        model = settings.linear_plant(loop, ("delay", "gain"))
         known = loop.parameters.get("gain")
         size = abs(known) if known else 1.0
-        self._settings = BankSettings(
+        self._settings = settings.BankSettings(
             num=model.num,
             den=model.den,
             air_behind_lags=model.air_behind_lags,
             own_lag=model.own_lag,
             delays=points.tolist(),
-            follow=is_range(delays),
-            layers=[(one, model.zero, [0.0] * points.size) for one in lag_sets(model, self._lags)],
+            follow=settings.is_range(delays),
+            layers=[
+                (one, model.zero, [0.0] * points.size)
+                for one in settings.lag_sets(model, self._lags)
+            ],
             gain=(float(known or 1.0), 0.5 * size) if gain is None else gain,
             memory=positive("memory", memory),
             drift=non_negative("drift", drift),
             gain_walk=non_negative("gain_drift", gain_drift * size),
             width=positive("width", width),
-            alarm=alarm_of(false_alarms_per_hour),
-            every=coarser(points),
+            alarm=settings.alarm_of(false_alarms_per_hour),
+            every=settings.coarser(points),
             at_rest=at_rest,
             level=level,
             freedom=GIVEN,
@@ -191,7 +185,7 @@ class OnlineEstimator:
         self._doubted_since = math.inf
         self._noise: FlightNoise | None = None
         self._rows: list[tuple[float, float | None]] = []
-        self._commands: list[tuple[float, float]] = []
+        self._commands: deque[tuple[float, float]] = deque()
         self._next_fit = math.inf
         self._reason = "the noise is being estimated"
         # The settings are checked now, not with the first row. It says what is known before one.
@@ -221,7 +215,7 @@ class OnlineEstimator:
         error = fit.stderr.get("lag", 0.0)
         if "lags" not in options and fit.lag and error > 0.0 and math.isfinite(error):
             low = max(fit.lag - AROUND * error, 0.1 * fit.lag)
-            options["lags"] = (low, fit.lag + AROUND * error, LAGS)
+            options["lags"] = (low, fit.lag + AROUND * error, settings.LAGS)
         options.setdefault("delays", (0.0, max(RANGE[1], BEYOND * fit.delay)))
         spread = fit.stderr.get("gain", 0.0)
         if fit.gain and "gain" not in options and 0.0 < spread < math.inf:
@@ -371,8 +365,8 @@ class OnlineEstimator:
     def _forget(self, time: float) -> None:
         """Forget what was before `time`, but for the command that held then."""
         self._rows = [row for row in self._rows if row[0] >= time]
-        held = sum(one[0] < time for one in self._commands)
-        self._commands = self._commands[max(held - 1, 0) :]
+        while len(self._commands) > 1 and self._commands[1][0] < time:
+            self._commands.popleft()
 
     def _fit(self) -> DelayEstimate:
         """The batch estimate of the rows so far."""
@@ -395,18 +389,13 @@ class OnlineEstimator:
             self._doubts = (f"the fit of the first {LAST:.0f} s was not reliable ({fit.message})",)
         self._begin(noise)
         assert self._bank is not None
-        commands = iter([*self._commands, (math.inf, 0.0)])
-        coming = next(commands)
         for time, output in self._rows:
-            while coming[0] < time:
-                self._bank.command(*coming)
-                coming = next(commands)
+            while self._commands and self._commands[0][0] < time:
+                self._bank.command(*self._commands.popleft())
             answer = self._bank.row(time, output)
-        while math.isfinite(coming[0]):
-            self._bank.command(*coming)
-            coming = next(commands)
+        while self._commands:
+            self._bank.command(*self._commands.popleft())
         self._rows.clear()
-        self._commands.clear()
         return self._estimate(answer)
 
 

@@ -21,6 +21,15 @@ const STEPS: usize = 60;
 /// Degrees of freedom beyond which four terms of the expansion of Student's quantile are exact.
 const MANY: f64 = 1e4;
 
+/// Largest lag-1 autocorrelation at which samples count as fewer independent ones.
+const MOST_ALIKE: f64 = 0.99;
+
+/// Number of independent samples that hold as much as so many of this lag-1 autocorrelation.
+pub fn independent_samples(samples: f64, autocorrelation: f64) -> f64 {
+    let rho = autocorrelation.clamp(0.0, MOST_ALIKE);
+    samples * (1.0 - rho) / (1.0 + rho)
+}
+
 /// P(x > value) of a normal variable.
 pub fn normal_beyond(value: f64) -> f64 {
     0.5 * libm::erfc(value / SQRT_2)

@@ -238,11 +238,7 @@ impl Candidate {
 
     /// Frequency and damping of a pair of complex poles, NaN where there is none.
     pub fn poles(&self) -> (f64, f64) {
-        if !self.numbers.are_complex() {
-            return (f64::NAN, f64::NAN);
-        }
-        let root = self.numbers.product.sqrt();
-        (1.0 / root, 0.5 * self.numbers.sum / root)
+        self.numbers.pair().unwrap_or((f64::NAN, f64::NAN))
     }
 
     /// Does the record show an error of its class?

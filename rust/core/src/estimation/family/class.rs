@@ -69,6 +69,25 @@ impl Class {
         names
     }
 
+    /// The gain and the other numbers, of values in the order of these names.
+    pub fn of_values(self, values: &[f64]) -> (f64, Numbers) {
+        let names = self.numbers();
+        let at = |name: &str| {
+            let place = names.iter().position(|own| *own == name);
+            place
+                .and_then(|place| values.get(place))
+                .copied()
+                .unwrap_or(0.0)
+        };
+        let numbers = Numbers {
+            delay: at("delay"),
+            sum: at("lag") + at("lag_sum"),
+            product: at("lag_product"),
+            zero: at("zero"),
+        };
+        (at("gain"), numbers)
+    }
+
     /// Is the other class this one with lags of zero, or none of its zero?
     pub(super) fn contains(self, other: Self) -> bool {
         self.integrating == other.integrating
@@ -147,6 +166,13 @@ impl Numbers {
     /// Are the poles a complex pair?
     pub fn are_complex(&self) -> bool {
         self.sum * self.sum < 4.0 * self.product
+    }
+
+    /// Frequency and damping of a pair of complex poles.
+    pub fn pair(&self) -> Option<(f64, f64)> {
+        let root = self.product.sqrt();
+        self.are_complex()
+            .then(|| (1.0 / root, 0.5 * self.sum / root))
     }
 
     /// The real time constants, largest first.

@@ -9,7 +9,7 @@ use super::super::rows::Rows;
 use super::median::median_step;
 use super::plant::FlightPlant;
 use super::rounded_rows::on_same_step;
-use super::tolerances::{NO_LAG, PRICES, SHORTEST_LAG};
+use super::tolerances::{LESS, NO_LAG, PRICES, SHORTEST_LAG};
 use crate::{Error, Task};
 
 /// One recording.
@@ -322,6 +322,44 @@ impl FlightFit {
         })
     }
 
+    /// Does the plant beside the noise explain far less of a recording than a fit of least squares?
+    ///
+    /// # Errors
+    ///
+    /// As for `parts`.
+    pub fn explains_less(&self, white: &Self, task: &Task) -> Result<bool, Error> {
+        let mut pairs = self.parts(task)?.iter().zip(white.parts(task)?);
+        Ok(pairs
+            .any(|(part, least)| deviation(&part.residuals) > LESS * deviation(&least.residuals)))
+    }
+
+    /// Is every recording rounded, and has no other noise than white beside?
+    pub fn is_rounding_alone(&self) -> bool {
+        let is_white = |one: &Noise| {
+            let parts = [one.air, one.sensor, one.stamps, one.arrivals];
+            parts.iter().all(|part| *part == 0.0)
+        };
+        let mut pairs = self.runs.iter().zip(self.noises());
+        pairs.all(|(run, noise)| run.rounding > 0.0 && is_white(noise))
+    }
+
+    /// Is what is left of each recording below this share of the range of its output?
+    ///
+    /// # Errors
+    ///
+    /// As for `parts`.
+    pub fn leaves_less_than(&self, share: f64, task: &Task) -> Result<bool, Error> {
+        let mut pairs = self.parts(task)?.iter().zip(self.runs.iter());
+        Ok(pairs.all(|(part, run)| {
+            let output = run.rows.output.iter();
+            let ends = output.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| {
+                (low.min(*y), high.max(*y))
+            });
+            let most = share * (ends.1 - ends.0);
+            part.residuals.iter().all(|left| left.abs() <= most)
+        }))
+    }
+
     /// The fitted output at the start of the first recording; not a number where it is given.
     ///
     /// # Errors
@@ -352,6 +390,51 @@ impl FlightFit {
         let place = usize::from(self.gain_is_eliminated()) + usize::from(rows.rows.offset);
         let trim = part.linear.get(place).filter(|_| self.trim);
         Ok((trim.copied().unwrap_or(0.0), part.variance.sqrt()))
+    }
+}
+
+/// The standard deviation of values.
+fn deviation(values: &[f64]) -> f64 {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt()
+}
+
+/// The noise of a recording in the units of its output.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoiseInUnits {
+    /// Standard deviation of the white noise.
+    pub white: f64,
+    /// That of the air, and its time constant, s, infinite without air.
+    pub air: (f64, f64),
+    /// The constant input.
+    pub trim: f64,
+    /// Standard deviation of the coloured noise of the sensor, and its time constant, s, zero without it.
+    pub sensor: (f64, f64),
+}
+
+impl FlightFit {
+    /// The noise of a recording in the units of its output.
+    ///
+    /// # Errors
+    ///
+    /// As for `trim_and_white`.
+    pub fn noise_in_units(&self, run: usize, task: &Task) -> Result<NoiseInUnits, Error> {
+        let (trim, white) = self.trim_and_white(run, task)?;
+        let one = &self.noises()[run];
+        let time = |is: bool, time: f64, none: f64| if is { time } else { none };
+        Ok(NoiseInUnits {
+            white,
+            air: (
+                white * one.air,
+                time(one.air > 0.0, one.air_time, f64::INFINITY),
+            ),
+            trim,
+            sensor: (
+                white * one.sensor,
+                time(one.sensor > 0.0, one.sensor_time, 0.0),
+            ),
+        })
     }
 }
 

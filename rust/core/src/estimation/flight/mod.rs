@@ -26,7 +26,7 @@ mod tests;
 mod tolerances;
 
 pub use between::{BetweenRows, Controlled, RunCommands, Sent, between_rows};
-pub use fit::{FlightFit, FlightRun, LoopNumbers};
+pub use fit::{FlightFit, FlightRun, LoopNumbers, NoiseInUnits};
 pub use intervals::{Ends, FlightProfile, Known as KnownQuantity};
 pub use judge::{
     Cause, Finding, Judgement, LEVEL_OF_TESTS, Whiteness, colour_factors, judge_profile,
@@ -34,6 +34,7 @@ pub use judge::{
 };
 pub use numbers::{FreeNumbers, WithNumbers, first_numbers, fit_numbers};
 pub use plant::FlightPlant;
+pub use rounded_rows::coarse_step;
 pub use rounds::{beside_noise, fit_flight};
 pub use search::{Scatter, scatter_of};
 pub use start::{is_long, least_squares};

@@ -1,6 +1,31 @@
 //! Rows of an output that is rounded.
 
-use super::tolerances::ROUNDED;
+use super::tolerances::{COARSE, ROUNDED};
+
+/// The step of a sensor that is coarse for how far its output moves, and beside noise of this deviation;
+/// zero of others. Rows that are not finite do not count.
+pub fn coarse_step(output: &[f64], noise: f64) -> f64 {
+    let known: Vec<f64> = output.iter().copied().filter(|y| y.is_finite()).collect();
+    let ends = known
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| {
+            (low.min(*y), high.max(*y))
+        });
+    let span = ends.1 - ends.0;
+    let moves = known.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let moves: Vec<f64> = moves.filter(|x| *x > COARSE.rounding * span).collect();
+    let step = moves.iter().copied().fold(f64::INFINITY, f64::min);
+    let is_multiple = |x: &f64| {
+        let whole = (x / step).round_ties_even();
+        (x / step - whole).abs() <= COARSE.alike.0 + COARSE.alike.1 * whole
+    };
+    let is_coarse = span < COARSE.levels * step && noise < COARSE.noise * step;
+    if !moves.is_empty() && is_coarse && moves.iter().all(is_multiple) {
+        step
+    } else {
+        0.0
+    }
+}
 
 /// The step to which an output was rounded, if its rows often stay on one step; else zero.
 ///

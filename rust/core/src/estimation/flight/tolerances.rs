@@ -232,6 +232,28 @@ pub(super) const ROUNDED: Rounded = Rounded {
     dithered: 0.18,
 };
 
+/// Sensors that read in coarse steps.
+pub(super) struct Coarse {
+    /// Moves below this share of the range are rounding of numbers.
+    pub(super) rounding: f64,
+    /// Moves are multiples of a step, within this part of it, and this share of the multiple.
+    pub(super) alike: (f64, f64),
+    /// Steps between the least and the largest reading from which on rounding acts like noise. Fewer:
+    /// rounding is correlated with the output, and intervals do not hold.
+    pub(super) levels: f64,
+    /// Deviation of the residuals, in steps, below which they are mostly rounding, whose own is 0.29. Larger:
+    /// noise of a sensor is taken for rounding.
+    pub(super) noise: f64,
+}
+
+/// See `Coarse`.
+pub(super) const COARSE: Coarse = Coarse {
+    rounding: 1e-9,
+    alike: (0.01, 1e-5),
+    levels: 32.0,
+    noise: 0.5,
+};
+
 /// Numbers that are searched around the likelihood.
 pub(super) struct Around {
     /// Distance of the points around the start of the search, in the logarithm of a number; its first
@@ -271,3 +293,7 @@ pub(super) const AROUND: Around = Around {
 
 /// Most numbers that are searched so: the points around the start are three to the power of them.
 pub const MOST_NUMBERS: usize = 4;
+
+/// Ratio of what is left to that of least squares from which the noise stands for the plant. Smaller: noise
+/// is doubted; larger: noise takes the place of a lag.
+pub(super) const LESS: f64 = 1.5;

@@ -57,6 +57,17 @@ pub fn robust_covariance(columns: &[Vec<f64>], residuals: &[f64], sizes: &[usize
     cov
 }
 
+/// The covariance of all of `count` parameters from that of those that are `loose`: zero for the others.
+pub fn embedded(cov: &[f64], loose: &[usize], count: usize) -> Vec<f64> {
+    let mut whole = vec![0.0; count * count];
+    for (i, row) in loose.iter().enumerate() {
+        for (j, column) in loose.iter().enumerate() {
+            whole[row * count + column] = cov[i * loose.len() + j];
+        }
+    }
+    whole
+}
+
 /// Andrews' bandwidth for the Bartlett kernel, residuals taken as an AR(1) process.
 fn bandwidth(residuals: &[f64]) -> usize {
     let n = residuals.len();

@@ -25,7 +25,7 @@ mod weights;
 
 pub use chebyshev::Chebyshev;
 pub use closed_loop::{ClosedLoop, Given, Number, Simulated};
-pub use covariance::{robust_covariance, white_covariance};
+pub use covariance::{embedded, robust_covariance, white_covariance};
 pub use held::least_held;
 pub use joint::{Fitted, Joint, Part};
 pub(super) use quotients::quotients;

@@ -17,6 +17,7 @@ use std::f64::consts::{PI, SQRT_2};
 use super::joint::{Joint, Space};
 use super::tolerances::{ROUNDED, SEARCH};
 use crate::elementary::{exp, log};
+use crate::estimation::flight::FlightRun;
 use crate::estimation::statistics::normal_beyond;
 use crate::linear_algebra::cholesky::inverse_of_positive;
 use crate::{Error, Task};
@@ -32,6 +33,32 @@ pub struct Readings {
     pub used: Vec<bool>,
     /// The step to which each recording is rounded.
     pub steps: Vec<f64>,
+}
+
+impl Readings {
+    /// The rows of recordings as they were first and as they were fitted: all but outliers, and those that
+    /// repeat the one before.
+    pub fn of_rows(first: &[FlightRun], fitted: &[FlightRun], repeated: &[Vec<usize>]) -> Self {
+        let mut found = Self {
+            output: Vec::new(),
+            recording: Vec::new(),
+            used: Vec::new(),
+            steps: fitted.iter().map(|run| run.rounding).collect(),
+        };
+        for (place, ((before, after), repeated)) in
+            first.iter().zip(fitted).zip(repeated).enumerate()
+        {
+            let pairs = before.rows.used.iter().zip(&after.rows.used);
+            let mut used: Vec<bool> = pairs.map(|(before, after)| !before || *after).collect();
+            for row in repeated.iter().filter(|row| **row < before.rows.used.len()) {
+                used[*row] = false;
+            }
+            found.recording.extend(vec![place; used.len()]);
+            found.output.extend(&before.rows.output);
+            found.used.extend(used);
+        }
+        found
+    }
 }
 
 /// The least −2 ln L, where it is, and the logarithms of the noise of each recording.

@@ -4,7 +4,7 @@
 //! products at all delays come from one correlation, and normal equations, which lose half of the
 //! digits, find the delays that are fitted again by least squares. Before the record, all is zero.
 
-use super::columns::Columns;
+use super::super::columns::Columns;
 use super::correlation::correlation;
 use crate::linear_algebra::vectors::dot;
 use crate::{Error, Task};

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::columns::Columns;
+use super::super::columns::Columns;
 use crate::linear_algebra::vectors::dot;
 
 /// Filters that whiten a command, and tests against chance.

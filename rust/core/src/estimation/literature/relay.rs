@@ -1,5 +1,6 @@
 //! The limit cycle of an integrator under a relay: crossings, switches, and what a lag adds.
 
+use super::held::HeldPath;
 use super::zero::zero;
 
 /// How crossings are read.
@@ -147,6 +148,65 @@ pub fn cycles(crossings: &[f64], switches: &[f64]) -> Cycles {
         delay,
         error: ((power + 2.0 * neighbours).max(power / count) / count).sqrt(),
     }
+}
+
+/// Largest error between each crossing and the next.
+pub fn peaks(time: &[f64], error: &[f64], crossings: &[f64]) -> Vec<f64> {
+    let row = |crossing: f64| time.partition_point(|t| *t < crossing);
+    let pairs = crossings.windows(2);
+    pairs
+        .map(|pair| {
+            let part = error.iter().take(row(pair[1])).skip(row(pair[0]));
+            part.fold(0.0, |most: f64, x| most.max(x.abs()))
+        })
+        .collect()
+}
+
+/// Rows of a limit cycle, the path of unit speed that its switches cause there, and the output, both about
+/// their means.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CyclePath {
+    /// The rows, from the arrival of the second switch to that of the last.
+    pub rows: std::ops::Range<usize>,
+    /// The path.
+    pub path: Vec<f64>,
+    /// The output.
+    pub output: Vec<f64>,
+    /// Speed of the output along the path.
+    pub speed: f64,
+}
+
+/// The path of a limit cycle whose switches arrive after a delay, behind a lag; none where no rows are left.
+pub fn cycle_path(
+    (time, output, reference): (&[f64], &[f64], &[f64]),
+    switches: &[f64],
+    delay: f64,
+    lag: f64,
+) -> Option<CyclePath> {
+    let (begin, end) = (switches.get(1)? + delay, switches.last()? + delay);
+    let rows = time.partition_point(|t| *t < begin)..time.partition_point(|t| *t <= end);
+    let first = rows.clone().next()?;
+    let sign = if output[first] > reference[first] {
+        1.0
+    } else {
+        -1.0
+    };
+    let values = (0..switches.len()).map(|i| if i % 2 == 0 { sign } else { -sign });
+    let held = HeldPath::new(switches.to_vec(), values.collect());
+    let at: Vec<f64> = time[rows.clone()].iter().map(|t| t - delay).collect();
+    let about_mean = |part: &[f64]| -> Vec<f64> {
+        let mean = part.iter().sum::<f64>() / part.len() as f64;
+        part.iter().map(|x| x - mean).collect()
+    };
+    let path = about_mean(&held.at(&at, lag).value);
+    let output = about_mean(&output[rows.clone()]);
+    let product = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+    Some(CyclePath {
+        speed: product(&path, &output) / product(&path, &path),
+        rows,
+        path,
+        output,
+    })
 }
 
 /// Increase of a quarter of the period by a lag, for half a period of `half`.

@@ -39,6 +39,69 @@ pub struct Tail {
     pub error: f64,
 }
 
+/// How the tail of a response is read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TailReading {
+    /// The tail begins where this share of the step is left.
+    pub share: f64,
+    /// What may be left with a command that is not limited, as a share of the step.
+    pub most: f64,
+    /// A movement that stands out of the noise.
+    pub clear: f64,
+    /// Fewest samples of a tail.
+    pub fewest: usize,
+}
+
+/// What is not rounding, as a share of the step: of a movement, and of the end of a tail.
+const LEAST: (f64, f64) = (1e-6, 1e-9);
+
+/// Added to what is left, whose logarithm is taken.
+const NONE: f64 = 1e-12;
+
+/// Share of the first sample of a tail down to which it gives a first guess of the rate, and the least guess.
+const GUESS: (f64, f64) = (0.2, 1e-3);
+
+/// The number of samples of the tail of a step response, at times since its step, and the exponential through
+/// them; none of too few.
+pub fn step_tail(since: &[f64], travelled: &[f64], reading: TailReading) -> (usize, Option<Tail>) {
+    let left: Vec<f64> = travelled.iter().map(|x| 1.0 - x).collect();
+    let last_above = |share: f64| left.iter().rposition(|left| *left > share);
+    let first = last_above(reading.share).map_or(0, |last| last + 1);
+    let mut begin = since.get(first).copied().unwrap_or(f64::INFINITY);
+    if let Some(limited) = last_above(reading.most) {
+        // The first movement of the output is an upper bound of the delay.
+        let movement = reading.clear.max(LEAST.0);
+        let moved = travelled.iter().position(|x| *x > movement).unwrap_or(0);
+        begin = begin.max(since[limited] + since[moved]);
+    }
+    // Errors below rounding hold no information.
+    let end = last_above(LEAST.1).map_or(0, |last| last + 1);
+    let rows = since.partition_point(|t| *t < begin)..end;
+    if rows.len() < reading.fewest {
+        return (rows.len(), None);
+    }
+    let time: Vec<f64> = since[rows.clone()]
+        .iter()
+        .map(|t| t - since[rows.start])
+        .collect();
+    let left = &left[rows.clone()];
+    let clear = reading.clear.max(GUESS.0 * left[0]);
+    let count = left.iter().position(|x| *x <= clear).unwrap_or(left.len());
+    let guess = -log_slope(&time[..count.max(2)], &left[..count.max(2)]);
+    (rows.len(), Some(tail_rate(&time, left, guess.max(GUESS.1))))
+}
+
+/// Slope of the line through the logarithm of what is left.
+fn log_slope(time: &[f64], left: &[f64]) -> f64 {
+    let logs: Vec<f64> = left.iter().map(|x| libm::log(x.abs() + NONE)).collect();
+    let count = time.len() as f64;
+    let centre = time.iter().sum::<f64>() / count;
+    let mean = logs.iter().sum::<f64>() / count;
+    let rows = time.iter().zip(&logs);
+    let shared: f64 = rows.map(|(t, x)| (t - centre) * (x - mean)).sum();
+    shared / time.iter().map(|t| (t - centre).powi(2)).sum::<f64>()
+}
+
 /// The exponential through what is left at times since its beginning, from a guess of its rate.
 pub fn tail_rate(time: &[f64], left: &[f64], guess: f64) -> Tail {
     let residuals = |height: f64, rate: f64| -> Vec<f64> {

@@ -38,7 +38,15 @@ pub struct Answer {
     pub evidence: f64,
 }
 
+/// Share of the walk from which the last rows told something.
+const INFORMED: f64 = 0.5;
+
 impl Answer {
+    /// Did the last rows tell something of the delay?
+    pub fn is_informed(&self) -> bool {
+        self.gate > INFORMED
+    }
+
     pub(super) fn none(time: f64, settings: &Settings) -> Self {
         let whole = |lag: f64| {
             let (low, high) = (

@@ -62,6 +62,11 @@ impl Columns {
         dot(&self.left, &self.left)
     }
 
+    /// What is left.
+    pub(super) fn left(&self) -> &[f64] {
+        &self.left
+    }
+
     /// Number of independent columns.
     pub(super) fn rank(&self) -> usize {
         self.units.len()
