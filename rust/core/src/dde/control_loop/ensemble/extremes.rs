@@ -3,7 +3,7 @@
 use crate::simd::{Mask, Real, Simd, outlined};
 
 use super::search::Search;
-use super::window::{EndsAt, Exceeds, Hit, Least, Strays};
+use super::window::{EndsAt, Exceeds, Hit, Strays};
 
 impl<S: Simd> Search<'_, S> {
     /// Extremes at corners, and the end of unrest.
@@ -23,7 +23,7 @@ impl<S: Simd> Search<'_, S> {
                 continue;
             }
             let range = self.chunks(chunk, chunk);
-            let hit = self.seek::<_, false>(wanted, range, EndsAt(value));
+            let hit = self.seek::<false>(wanted, range, &EndsAt(value));
             let time = hit.here.select(self.view.times(hit.part + 1.0), nan);
             let extreme = if is_top {
                 &mut self.measured.top
@@ -41,7 +41,7 @@ impl<S: Simd> Search<'_, S> {
                 band: self.measured.quiet_band,
             };
             let range = (zero, self.chunks(chunk, chunk).1);
-            let hit = self.seek::<_, true>(wanted, range, test);
+            let hit = self.seek::<true>(wanted, range, &test);
             let time = self.view.times(hit.part + 1.0);
             self.measured.unsettled_until = hit.here.select(time, self.measured.unsettled_until);
         }
@@ -68,10 +68,10 @@ impl<S: Simd> Search<'_, S> {
                     (-one, -self.measured.bottom.0)
                 };
                 let bar = most + self.spots.tolerance;
-                let hit = self.seek::<_, false>(
+                let hit = self.seek::<false>(
                     wanted,
                     (begin, end),
-                    Exceeds {
+                    &Exceeds {
                         sign,
                         bar,
                         most_change,
@@ -116,15 +116,14 @@ impl<S: Simd> Search<'_, S> {
         let end = self.chunks(chunk, chunk).1;
         // The chunks after the one in which the level may be reached first are known together.
         let is_there = hit.part.lt(end);
-        let least = Least {
-            trace: self.view.trace,
-            window: self.window,
-            wanted: done,
-            begin: hit.part,
-            end: is_there.select(end, parts),
-            sign: self.measured.sign,
-        };
-        let least = outlined(value.simd(), least).smaller(value);
+        let range = (hit.part, is_there.select(end, parts));
+        let (trace, window, sign) = (self.view.trace, &mut *self.window, self.measured.sign);
+        let least = outlined(
+            value.simd(),
+            #[inline(always)]
+            || window.least(trace, done, range, sign),
+        );
+        let least = least.smaller(value);
         let dip = is_there.select(least.smaller(self.spots.dip), least);
         self.measured.dip = done.select(dip, self.measured.dip);
         self.spots.dip_from = done.select(hit.part + 1.0, self.spots.dip_from);
@@ -146,7 +145,7 @@ impl<S: Simd> Search<'_, S> {
                 bar: -bar,
                 most_change: self.most_change(),
             };
-            let hit = self.seek::<_, false>(wanted, (from, to), test);
+            let hit = self.seek::<false>(wanted, (from, to), &test);
             begin = hit.here.select(hit.part + 1.0, to);
             wanted = wanted & begin.lt(parts);
             if !hit.here.any() {

@@ -22,7 +22,7 @@ impl<S: Simd> Search<'_, S> {
         let mut begin = self.chunks(chunk, chunk).0;
         while wanted.any() {
             let test = Reaches { sign, level };
-            let hit = self.seek::<_, false>(wanted, (begin, self.spots.parts), test);
+            let hit = self.seek::<false>(wanted, (begin, self.spots.parts), &test);
             wanted = hit.here;
             if !wanted.any() {
                 break;
@@ -83,7 +83,7 @@ impl<S: Simd> Search<'_, S> {
         wanted = wanted & !outside;
         while wanted.any() {
             let test = Strays { steady, band };
-            let hit = self.seek::<_, true>(wanted, (zero, end), test);
+            let hit = self.seek::<true>(wanted, (zero, end), &test);
             wanted = hit.here;
             if !wanted.any() {
                 break;

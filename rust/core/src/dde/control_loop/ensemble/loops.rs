@@ -2,10 +2,10 @@
 //!
 //! `N` is the number of states, of which the first `P` are those of the plant.
 
-use crate::simd::{Mask, Outlined, Real, Simd, outlined};
+use crate::simd::{Mask, Real, Simd, outlined};
 
 use super::block::{Block, Number};
-use super::transition::{Map, Matrix, Over, row, scaled};
+use super::transition::{Held, Map, Matrix, row, scaled};
 
 /// A part of a sample, on which the command that reaches the plant is constant.
 #[derive(Clone, Copy)]
@@ -145,13 +145,11 @@ impl<S: Simd, const N: usize, const P: usize> Loops<S, N, P> {
                 continue;
             }
             (part.length, part.is_jump) = (length / f64::from(parts), false);
-            let over = Over {
-                a: &full,
-                drive: &drive,
-                push: &push,
-                h: part.length,
-            };
-            let held = over.held();
+            let held = outlined(
+                simd,
+                #[inline(always)]
+                || Held::over(&full, (&drive, &push), part.length),
+            );
             for _ in 0..parts {
                 part.offset = offset;
                 runs.parts.push(part);
@@ -168,13 +166,10 @@ impl<S: Simd, const N: usize, const P: usize> Loops<S, N, P> {
             plants.corners.push(corner);
         }
         if runs.is_curved {
-            let plants = &mut plants;
             outlined(
                 simd,
-                Bulges {
-                    plants,
-                    runs: &runs,
-                },
+                #[inline(always)]
+                || plants.bound(&runs),
             );
         }
         Self {
@@ -189,22 +184,15 @@ impl<S: Simd, const N: usize, const P: usize> Loops<S, N, P> {
     }
 }
 
-/// A function with |y″| ≤ M stays within M h²/8 of its chord, and y″ = c A e^{A t} x′.
-struct Bulges<'a, S: Simd, const P: usize> {
-    plants: &'a mut Plants<S, P>,
-    runs: &'a Runs<S>,
-}
-
-impl<S: Simd, const P: usize> Outlined for Bulges<'_, S, P> {
-    type Output = ();
-
+impl<S: Simd, const P: usize> Plants<S, P> {
+    /// Bound the bulges: a function with |y″| ≤ M stays within M h²/8 of its chord, and y″ =
+    /// c A e^{A t} x′.
     #[inline(always)]
-    fn run(self) {
-        let Self { plants, runs } = self;
+    fn bound(&mut self, runs: &Runs<S>) {
         let zero = runs.zero;
-        let slope = along(&plants.c, &plants.a);
+        let slope = along(&self.c, &self.a);
         let (mut most, mut longest) = ([zero; P], zero);
-        for (part, start) in runs.parts.iter().zip(&plants.starts) {
+        for (part, start) in runs.parts.iter().zip(&self.starts) {
             if part.is_jump {
                 continue;
             }
@@ -217,7 +205,7 @@ impl<S: Simd, const P: usize> Outlined for Bulges<'_, S, P> {
             let mut sum = absolute(&term);
             for j in 1..=runs.degree {
                 let factor = part.length * (1.0 / j as f64);
-                term = scaled(&along(&term, &plants.a), factor);
+                term = scaled(&along(&term, &self.a), factor);
                 for (sum, term) in sum.iter_mut().zip(&term) {
                     *sum = *sum + term.abs();
                 }
@@ -227,8 +215,8 @@ impl<S: Simd, const P: usize> Outlined for Bulges<'_, S, P> {
             }
         }
         let share = longest * longest * 0.125;
-        plants.bulge = scaled(&most, share);
-        plants.bulge_of_jump = row(&plants.bulge, &absolute(&plants.b), zero);
+        self.bulge = scaled(&most, share);
+        self.bulge_of_jump = row(&self.bulge, &absolute(&self.b), zero);
     }
 }
 

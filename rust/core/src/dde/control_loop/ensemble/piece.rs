@@ -8,7 +8,7 @@
 
 use crate::dde::control_loop::level_crossings::crossings;
 use crate::dde::control_loop::series::{DEGREE, Series};
-use crate::simd::{Mask, Outlined, Real, Simd};
+use crate::simd::{Mask, Real, Simd};
 
 use super::trace::of;
 
@@ -100,7 +100,7 @@ impl<S: Simd> Piece<S> {
     /// Extrema in (0, 1), and crossings of a level where there are none. `sought` is filled with
     /// the polynomials whose zeros these are.
     #[inline(always)]
-    fn shown(&self, sought: &mut Self, asked: &Asked<S>) -> Shown<S> {
+    pub(super) fn shown(&self, sought: &mut Self, asked: &Asked<S>) -> Shown<S> {
         let zero = self.terms[0].constant(0.0);
         let (mut sum, mut least, mut most) = (zero, zero, zero);
         let (mut bend, mut lowest, mut highest) = (zero, zero, zero);
@@ -190,22 +190,6 @@ impl<S: Simd> Piece<S> {
             *c = of(term, lane);
         }
         series
-    }
-}
-
-/// See [`Piece::shown`].
-pub(super) struct Solve<'a, S: Simd> {
-    pub(super) piece: &'a Piece<S>,
-    pub(super) sought: &'a mut Piece<S>,
-    pub(super) asked: Asked<S>,
-}
-
-impl<S: Simd> Outlined for Solve<'_, S> {
-    type Output = Shown<S>;
-
-    #[inline(always)]
-    fn run(self) -> Self::Output {
-        self.piece.shown(self.sought, &self.asked)
     }
 }
 

@@ -9,11 +9,11 @@ use crate::dde::control_loop::series::Series;
 use crate::simd::{Mask, Real, Simd, outlined};
 
 use super::measured::Measured;
-use super::piece::{Asked, Piece, Shown, Solve, turns};
+use super::piece::{Asked, Piece, Shown, turns};
 use super::spots::Spots;
 use super::trace::of;
 use super::view::View;
-use super::window::{Hit, Seek, Test, Window};
+use super::window::{Hit, Test, Window};
 
 /// The search of a trace.
 pub(super) struct Search<'a, S: Simd> {
@@ -28,21 +28,18 @@ pub(super) struct Search<'a, S: Simd> {
 impl<S: Simd> Search<'_, S> {
     /// The first part of a range that passes a test.
     #[inline(always)]
-    pub(super) fn seek<T: Test<S>, const BACK: bool>(
+    pub(super) fn seek<const BACK: bool>(
         &mut self,
         wanted: Mask<S>,
-        (begin, end): (Real<S>, Real<S>),
-        test: T,
+        range: (Real<S>, Real<S>),
+        test: &impl Test<S>,
     ) -> Hit<S> {
-        let seek: Seek<'_, S, T, BACK> = Seek {
-            trace: self.view.trace,
-            window: self.window,
-            wanted,
-            begin,
-            end,
-            test,
-        };
-        outlined(begin.simd(), seek)
+        let (trace, window) = (self.view.trace, &mut *self.window);
+        outlined(
+            range.0.simd(),
+            #[inline(always)]
+            || window.seek::<BACK>(trace, wanted, range, test),
+        )
     }
 
     /// See [`Exceeds::most_change`].
@@ -86,12 +83,11 @@ impl<S: Simd> Search<'_, S> {
             level,
             high,
         };
-        let solve = Solve {
-            piece,
-            sought,
-            asked,
-        };
-        outlined(part.simd(), solve)
+        outlined(
+            part.simd(),
+            #[inline(always)]
+            || piece.shown(sought, &asked),
+        )
     }
 
     /// The polynomial of a loop.

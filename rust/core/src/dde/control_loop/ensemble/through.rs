@@ -2,7 +2,7 @@
 
 use pulp::WithSimd;
 
-use crate::simd::{Instructions, Outlined, Real, Simd, outlined};
+use crate::simd::{Instructions, Real, Simd, outlined};
 
 use super::block::{Block, Members};
 use super::delayed::{Delayed, Steps};
@@ -120,19 +120,21 @@ struct Pair<'a, S, J> {
 impl<S: Simd, J: Job> Pair<'_, S, J> {
     /// Sampled loops.
     fn run<const N: usize, const P: usize>(&self, trace: &mut Trace<S>, found: &mut Vec<J::Found>) {
-        let made: Made<'_, S, N, P> = Made {
-            simd: self.simd,
-            block: self.block,
-            pair: self.pair,
-            span: self.span,
-        };
-        let loops = outlined(self.simd, made);
+        let loops: Loops<S, N, P> = outlined(
+            self.simd,
+            #[inline(always)]
+            || Loops::new(self.simd, self.block, self.pair, self.span),
+        );
         self.process(&loops.runs, &mut Walk::new(&loops), trace, found);
     }
 
     /// Continuous loops.
     fn step<const N: usize>(&self, trace: &mut Trace<S>, found: &mut Vec<J::Found>) {
-        let loops: Delayed<S, N> = Delayed::new(self.simd, self.block, self.pair, self.span);
+        let loops: Delayed<S, N> = outlined(
+            self.simd,
+            #[inline(always)]
+            || Delayed::new(self.simd, self.block, self.pair, self.span),
+        );
         self.process(&loops.runs, &mut Steps::new(&loops), trace, found);
     }
 
@@ -143,52 +145,10 @@ impl<S: Simd, J: Job> Pair<'_, S, J> {
         trace: &mut Trace<S>,
         found: &mut Vec<J::Found>,
     ) {
-        let job = Done {
-            job: self.job,
-            loops,
-            run,
-            members: self.members,
-            trace,
-            found,
-        };
-        outlined(self.simd, job);
-    }
-}
-
-/// See [`Loops::new`].
-struct Made<'a, S, const N: usize, const P: usize> {
-    simd: S,
-    block: &'a Block,
-    pair: usize,
-    span: f64,
-}
-
-impl<S: Simd, const N: usize, const P: usize> Outlined for Made<'_, S, N, P> {
-    type Output = Loops<S, N, P>;
-
-    #[inline(always)]
-    fn run(self) -> Loops<S, N, P> {
-        Loops::new(self.simd, self.block, self.pair, self.span)
-    }
-}
-
-/// See [`Job::found`].
-struct Done<'a, S: Simd, J: Job> {
-    job: &'a J,
-    loops: &'a Runs<S>,
-    run: &'a mut dyn Run<S>,
-    members: &'a [usize],
-    trace: &'a mut Trace<S>,
-    found: &'a mut Vec<J::Found>,
-}
-
-impl<S: Simd, J: Job> Outlined for Done<'_, S, J> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let (members, trace) = (self.members, self.trace);
-        self.job
-            .found(self.loops, self.run, members, trace, self.found);
+        outlined(
+            self.simd,
+            #[inline(always)]
+            || self.job.found(loops, run, self.members, trace, found),
+        );
     }
 }

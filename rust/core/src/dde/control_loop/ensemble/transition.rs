@@ -11,7 +11,7 @@
     reason = "indices as in the formulas; closures would not be compiled for the vectors"
 )]
 
-use crate::simd::{Outlined, Real, Simd, outlined};
+use crate::simd::{Real, Simd, outlined};
 
 /// Largest ‖A‖₁ h for which φ is summed without doubling.
 const REACH: f64 = 0.25;
@@ -70,26 +70,14 @@ pub(super) struct Held<S: Simd, const N: usize> {
     push: [Real<S>; N],
 }
 
-/// `h` seconds under constant w and r; `push` is E r.
-pub(super) struct Over<'a, S: Simd, const N: usize> {
-    pub(super) a: &'a Matrix<S, N>,
-    pub(super) drive: &'a [Real<S>; N],
-    pub(super) push: &'a [Real<S>; N],
-    pub(super) h: Real<S>,
-}
-
-impl<S: Simd, const N: usize> Over<'_, S, N> {
-    pub(super) fn held(self) -> Held<S, N> {
-        outlined(self.h.simd(), self)
-    }
-}
-
-impl<S: Simd, const N: usize> Outlined for Over<'_, S, N> {
-    type Output = Held<S, N>;
-
+impl<S: Simd, const N: usize> Held<S, N> {
+    /// `h` seconds under constant w and r; `push` is E r.
     #[inline(always)]
-    fn run(self) -> Held<S, N> {
-        let Self { a, drive, push, h } = self;
+    pub(super) fn over(
+        a: &Matrix<S, N>,
+        (drive, push): (&[Real<S>; N], &[Real<S>; N]),
+        h: Real<S>,
+    ) -> Self {
         let zero = h.constant(0.0);
         let mut norm = zero;
         for j in 0..N {
@@ -101,7 +89,7 @@ impl<S: Simd, const N: usize> Outlined for Over<'_, S, N> {
         }
         if !norm.gt(0.0).any() {
             // The result of the series, at less cost.
-            return Held {
+            return Self {
                 growth: [[zero; N]; N],
                 drive: scaled(drive, h),
                 push: scaled(push, h),
@@ -126,7 +114,7 @@ impl<S: Simd, const N: usize> Outlined for Over<'_, S, N> {
                 row[i] = row[i] + 1.0;
             }
         }
-        let mut held = Held {
+        let mut held = Self {
             growth: product(&z, &phi),
             drive: scaled(&times(&phi, drive), step),
             push: scaled(&times(&phi, push), step),
@@ -178,12 +166,33 @@ impl<S: Simd, const N: usize> Map<S, N> {
 
     /// This change, and that of a part under w₁ or w₀ after it.
     pub(super) fn then(&self, part: &Held<S, N>, is_before: bool) -> Self {
-        let then = Then {
-            map: self,
-            part,
-            is_before,
-        };
-        outlined(part.drive[0].simd(), then)
+        outlined(
+            part.drive[0].simd(),
+            #[inline(always)]
+            || self.continued(part, is_before),
+        )
+    }
+
+    #[inline(always)]
+    fn continued(&self, part: &Held<S, N>, is_before: bool) -> Self {
+        let mut out = *self;
+        let grown = product(&part.growth, &self.growth);
+        for i in 0..N {
+            for j in 0..N {
+                out.growth[i][j] = self.growth[i][j] + (part.growth[i][j] + grown[i][j]);
+            }
+            let growth = &part.growth[i];
+            out.before[i] = row(growth, &self.before, self.before[i]);
+            out.after[i] = row(growth, &self.after, self.after[i]);
+            out.push[i] = row(growth, &self.push, self.push[i]) + part.push[i];
+            let reached = if is_before {
+                &mut out.before
+            } else {
+                &mut out.after
+            };
+            reached[i] = reached[i] + part.drive[i];
+        }
+        out
     }
 
     /// The first `P` states, which the others do not reach.
@@ -208,40 +217,6 @@ impl<S: Simd, const N: usize> Map<S, N> {
             let forced = self.before[i].mul_add(before, self.push[i]);
             let forced = self.after[i].mul_add(after, forced);
             *out = x[i] + row(&self.growth[i], x, forced);
-        }
-        out
-    }
-}
-
-/// See [`Map::then`].
-struct Then<'a, S: Simd, const N: usize> {
-    map: &'a Map<S, N>,
-    part: &'a Held<S, N>,
-    is_before: bool,
-}
-
-impl<S: Simd, const N: usize> Outlined for Then<'_, S, N> {
-    type Output = Map<S, N>;
-
-    #[inline(always)]
-    fn run(self) -> Map<S, N> {
-        let (map, part) = (self.map, self.part);
-        let mut out = *map;
-        let grown = product(&part.growth, &map.growth);
-        for i in 0..N {
-            for j in 0..N {
-                out.growth[i][j] = map.growth[i][j] + (part.growth[i][j] + grown[i][j]);
-            }
-            let growth = &part.growth[i];
-            out.before[i] = row(growth, &map.before, map.before[i]);
-            out.after[i] = row(growth, &map.after, map.after[i]);
-            out.push[i] = row(growth, &map.push, map.push[i]) + part.push[i];
-            let reached = if self.is_before {
-                &mut out.before
-            } else {
-                &mut out.after
-            };
-            reached[i] = reached[i] + part.drive[i];
         }
         out
     }

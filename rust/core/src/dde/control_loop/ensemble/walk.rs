@@ -6,10 +6,9 @@
 )]
 
 use crate::dde::limits::DIVERGED;
-use crate::simd::{Mask, Outlined, Real, Simd, outlined};
+use crate::simd::{Mask, Real, Simd, outlined};
 
-use super::decay::{Decay, Within};
-use super::expand::Expand;
+use super::decay::Decay;
 use super::loops::{Loops, Runs};
 use super::piece::Piece;
 use super::trace::{CHUNK, SAMPLES, Summary, Trace};
@@ -308,8 +307,11 @@ impl<S: Simd, const N: usize, const P: usize> Run<S> for Walk<'_, S, N, P> {
     }
 
     fn advance(&mut self, trace: &mut Trace<S>) -> bool {
-        let simd = self.output.simd();
-        outlined(simd, Advance { walk: self, trace })
+        outlined(
+            self.output.simd(),
+            #[inline(always)]
+            || self.go_on(trace),
+        )
     }
 
     fn lost(&self) -> Mask<S> {
@@ -326,41 +328,22 @@ impl<S: Simd, const N: usize, const P: usize> Run<S> for Walk<'_, S, N, P> {
 
     fn piece(&self, trace: &Trace<S>, parts: Real<S>, piece: &mut Piece<S>) {
         let Loops { runs, plants, .. } = self.loops;
-        let expand = Expand {
-            runs,
-            plants,
-            trace,
-            parts,
-            piece,
-        };
-        outlined(parts.simd(), expand);
+        outlined(
+            parts.simd(),
+            #[inline(always)]
+            || plants.expand(runs, trace, parts, piece),
+        );
     }
 
     fn decay(&self, radius: Real<S>) -> Decay<S> {
         let Loops {
             runs, controllers, ..
         } = self.loops;
-        let within = Within {
-            runs,
-            controllers,
-            radius,
-        };
-        outlined(radius.simd(), within)
-    }
-}
-
-/// See [`Run::advance`].
-struct Advance<'a, 'b, S: Simd, const N: usize, const P: usize> {
-    walk: &'a mut Walk<'b, S, N, P>,
-    trace: &'a mut Trace<S>,
-}
-
-impl<S: Simd, const N: usize, const P: usize> Outlined for Advance<'_, '_, S, N, P> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run(self) -> bool {
-        self.walk.go_on(self.trace)
+        outlined(
+            radius.simd(),
+            #[inline(always)]
+            || controllers.decay(runs, radius),
+        )
     }
 }
 

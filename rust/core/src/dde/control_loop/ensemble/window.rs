@@ -3,7 +3,7 @@
 //! Each loop has a range of parts of its own. Some parts of all ranges are read side by side, and a
 //! test is made of them without a branch.
 
-use crate::simd::{Lanes, Mask, Outlined, Real, Simd, flat, flat_mut};
+use crate::simd::{Lanes, Mask, Real, Simd, flat, flat_mut};
 
 use super::trace::{Trace, WINDOW};
 
@@ -155,25 +155,18 @@ pub(super) struct Hit<S: Simd> {
     pub(super) bulge: Real<S>,
 }
 
-/// The first or, if `BACK`, the last part of a range of each wanted loop that passes a test.
-pub(super) struct Seek<'a, S: Simd, T, const BACK: bool> {
-    pub(super) trace: &'a Trace<S>,
-    pub(super) window: &'a mut Window<S>,
-    pub(super) wanted: Mask<S>,
-    pub(super) begin: Real<S>,
-    pub(super) end: Real<S>,
-    pub(super) test: T,
-}
-
-impl<S: Simd, T: Test<S>, const BACK: bool> Outlined for Seek<'_, S, T, BACK> {
-    type Output = Hit<S>;
-
+impl<S: Simd> Window<S> {
+    /// The first or, if `BACK`, the last part of a range of each wanted loop that passes a test.
     #[inline(always)]
-    fn run(self) -> Hit<S> {
-        let (mut begin, mut end) = (self.begin, self.end);
+    pub(super) fn seek<const BACK: bool>(
+        &mut self,
+        trace: &Trace<S>,
+        wanted: Mask<S>,
+        (mut begin, mut end): (Real<S>, Real<S>),
+        test: &impl Test<S>,
+    ) -> Hit<S> {
         let zero = begin.constant(0.0);
         let simd = zero.simd();
-        let window = self.window;
         let mut hit = Hit {
             here: zero.lt(0.0),
             part: zero,
@@ -181,25 +174,25 @@ impl<S: Simd, T: Test<S>, const BACK: bool> Outlined for Seek<'_, S, T, BACK> {
             last: zero,
             bulge: zero,
         };
-        let mut open = self.wanted & begin.lt(end);
+        let mut open = wanted & begin.lt(end);
         while open.any() {
             let (from, to) = if BACK {
                 (begin.larger(end - WINDOW as f64), end)
             } else {
                 (begin, end.smaller(begin + WINDOW as f64))
             };
-            let is_read = from.ge(window.from) & to.le(window.from + WINDOW as f64);
+            let is_read = from.ge(self.from) & to.le(self.from + WINDOW as f64);
             if (open & !is_read).any() {
-                window.read(self.trace, open, from);
+                self.read(trace, open, from);
             }
             for step in 0..WINDOW {
                 // The part found last counts.
                 let number = if BACK { step } else { WINDOW - 1 - step };
-                let part = window.from + number as f64;
-                let first = Real::new(simd, window.outputs[number]);
-                let last = Real::new(simd, window.outputs[number + 1]);
-                let bulge = Real::new(simd, window.bulges[number]);
-                let holds = self.test.holds(first, last, bulge);
+                let part = self.from + number as f64;
+                let first = Real::new(simd, self.outputs[number]);
+                let last = Real::new(simd, self.outputs[number + 1]);
+                let bulge = Real::new(simd, self.bulges[number]);
+                let holds = test.holds(first, last, bulge);
                 let holds = open & holds & part.ge(from) & part.lt(to);
                 hit.here = hit.here | holds;
                 hit.part = holds.select(part, hit.part);
@@ -216,37 +209,28 @@ impl<S: Simd, T: Test<S>, const BACK: bool> Outlined for Seek<'_, S, T, BACK> {
         }
         hit
     }
-}
 
-/// The least output, multiplied by a sign, at the ends of the parts of a range of each wanted loop.
-pub(super) struct Least<'a, S: Simd> {
-    pub(super) trace: &'a Trace<S>,
-    pub(super) window: &'a mut Window<S>,
-    pub(super) wanted: Mask<S>,
-    pub(super) begin: Real<S>,
-    pub(super) end: Real<S>,
-    pub(super) sign: Real<S>,
-}
-
-impl<S: Simd> Outlined for Least<'_, S> {
-    type Output = Real<S>;
-
+    /// The least output, multiplied by a sign, at the ends of the parts of a range of each wanted loop.
     #[inline(always)]
-    fn run(self) -> Real<S> {
-        let (mut begin, end) = (self.begin, self.end);
+    pub(super) fn least(
+        &mut self,
+        trace: &Trace<S>,
+        wanted: Mask<S>,
+        (mut begin, end): (Real<S>, Real<S>),
+        sign: Real<S>,
+    ) -> Real<S> {
         let zero = begin.constant(0.0);
-        let window = self.window;
         let mut least = zero.constant(f64::INFINITY);
-        let mut open = self.wanted & begin.lt(end);
+        let mut open = wanted & begin.lt(end);
         while open.any() {
             let to = end.smaller(begin + WINDOW as f64);
-            let is_read = begin.ge(window.from) & to.le(window.from + WINDOW as f64);
+            let is_read = begin.ge(self.from) & to.le(self.from + WINDOW as f64);
             if (open & !is_read).any() {
-                window.read(self.trace, open, begin);
+                self.read(trace, open, begin);
             }
             for number in 0..WINDOW {
-                let part = window.from + number as f64;
-                let last = Real::new(zero.simd(), window.outputs[number + 1]) * self.sign;
+                let part = self.from + number as f64;
+                let last = Real::new(zero.simd(), self.outputs[number + 1]) * sign;
                 let counts = open & part.ge(begin) & part.lt(to);
                 least = counts.select(least.min(last), least);
             }
