@@ -11,6 +11,8 @@
 use crate::dde::control_loop::linear_loop::LinearLoop;
 use crate::dde::scalar::Scalar;
 
+use super::saturation::Side;
+
 /// A signal of the loop.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Signal<S> {
@@ -82,9 +84,6 @@ impl<S: Scalar> Signal<S> {
         self.constant + self.r * S::from(r)
     }
 }
-
-/// Where the command is relative to a bound: −1 below the least, 1 above the greatest, 0 within.
-pub(super) type Side = i8;
 
 /// What the integral does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -13,7 +13,6 @@
 //! simulated (elements are no longer than either allows), or where many breaks accumulate.
 
 mod aligned;
-mod delayed;
 mod effort;
 mod expansion;
 mod field;

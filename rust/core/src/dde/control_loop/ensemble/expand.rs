@@ -5,13 +5,12 @@
     reason = "indices as in the formulas; closures would not be compiled for the vectors"
 )]
 
-use crate::simd::{Real, Simd};
+use crate::simd::{Mask, Real, Simd};
 
 use super::loops::{Plants, Runs};
 use super::piece::Piece;
 use super::trace::{Trace, of};
 use super::transition::row;
-use super::window::shared;
 
 impl<S: Simd> Trace<S> {
     /// The states and commands of parts, and the numbers of these within their samples.
@@ -101,4 +100,13 @@ impl<S: Simd, const P: usize> Plants<S, P> {
             piece.terms[j] = self.seen(&v);
         }
     }
+}
+
+/// The number that all lanes in `here` have in common.
+#[inline(always)]
+fn shared<S: Simd>(numbers: Real<S>, here: Mask<S>) -> Option<f64> {
+    let lanes = here.select(numbers, numbers.constant(f64::NAN));
+    let first = *lanes.numbers().iter().find(|number| !number.is_nan())?;
+    let others = here & !numbers.eq(first);
+    (!others.any()).then_some(first)
 }

@@ -2,11 +2,10 @@
 
 use crate::dde::control_loop::level_crossings::crossings;
 use crate::dde::control_loop::series::Series;
-use crate::simd::{Mask, Real, Simd};
+use crate::simd::Simd;
 
-use super::search::{Passing, Search};
+use super::search::Search;
 use super::trace::of;
-use super::window::{Reaches, Strays};
 
 impl<S: Simd> Search<'_, S> {
     /// When a level of the rise is reached.
@@ -21,8 +20,12 @@ impl<S: Simd> Search<'_, S> {
         let mut wanted = self.measured.counts & !risen.eq(risen) & chunk.ge(0.0);
         let mut begin = self.chunks(chunk, chunk).0;
         while wanted.any() {
-            let test = Reaches { sign, level };
-            let hit = self.seek::<false>(wanted, (begin, self.spots.parts), &test);
+            let hit = self.seek::<false>(
+                wanted,
+                (begin, self.spots.parts),
+                #[inline(always)]
+                |_, [first, last, bulge]| ((first * sign).max(last * sign) + bulge).ge(level),
+            );
             wanted = hit.here;
             if !wanted.any() {
                 break;
@@ -45,7 +48,13 @@ impl<S: Simd> Search<'_, S> {
                 let until = self.until(hit.part);
                 let crosses = crosses & curved;
                 let shown = self.shown(hit.part, curved, (crosses, level * sign));
-                let reaches = self.passes(&shown, curved & !crosses, until, &Reached(sign, level));
+                let reaches = self.passes(
+                    &shown,
+                    curved & !crosses,
+                    until,
+                    #[inline(always)]
+                    |output| (output * sign).ge(level),
+                );
                 let sigma = self.crossing(&shown, crosses | reaches, until, level * sign);
                 done = done | crosses | reaches;
                 time = curved.select(self.time_in(hit.part, sigma), time);
@@ -82,8 +91,7 @@ impl<S: Simd> Search<'_, S> {
         self.measured.inside_since = outside.select(nan, self.measured.inside_since);
         wanted = wanted & !outside;
         while wanted.any() {
-            let test = Strays { steady, band };
-            let hit = self.seek::<true>(wanted, (zero, end), &test);
+            let hit = self.seek_strayed(wanted, (zero, end), band);
             wanted = hit.here;
             if !wanted.any() {
                 break;
@@ -99,8 +107,13 @@ impl<S: Simd> Search<'_, S> {
                 let until = self.until(hit.part);
                 let enters = enters & curved;
                 let shown = self.shown(hit.part, curved, (enters, edge));
-                let beyond = Beyond(steady, band);
-                let leaves = self.passes(&shown, curved & !enters, until, &beyond);
+                let leaves = self.passes(
+                    &shown,
+                    curved & !enters,
+                    until,
+                    #[inline(always)]
+                    |output| (output - steady).abs().gt(band),
+                );
                 let mut sigma = shown.crossing;
                 done = done | enters | leaves;
                 let unknown = (enters | leaves) & !sigma.eq(sigma);
@@ -117,26 +130,6 @@ impl<S: Simd> Search<'_, S> {
             self.measured.inside_since = done.select(time, self.measured.inside_since);
             wanted = wanted & !done;
         }
-    }
-}
-
-/// Do they, multiplied by a sign, reach a level?
-struct Reached<S: Simd>(Real<S>, Real<S>);
-
-impl<S: Simd> Passing<S> for Reached<S> {
-    #[inline(always)]
-    fn holds(&self, output: Real<S>) -> Mask<S> {
-        (output * self.0).ge(self.1)
-    }
-}
-
-/// Are they farther than a band from a steady state?
-struct Beyond<S: Simd>(Real<S>, Real<S>);
-
-impl<S: Simd> Passing<S> for Beyond<S> {
-    #[inline(always)]
-    fn holds(&self, output: Real<S>) -> Mask<S> {
-        (output - self.0).abs().gt(self.1)
     }
 }
 

@@ -10,7 +10,6 @@ use super::measured::Measured;
 use super::search::Search;
 use super::spots::Spots;
 use super::view::View;
-use super::window::Window;
 
 /// Measure a trace.
 pub(super) fn measure<S: Simd>(view: &View<'_, S>, measured: &mut Measured<S>) {
@@ -24,7 +23,6 @@ pub(super) fn measure<S: Simd>(view: &View<'_, S>, measured: &mut Measured<S>) {
     let mut search = Search {
         view,
         spots: &mut spots,
-        window: &mut Window::new(zero),
         pieces: &mut None,
         measured,
     };
