@@ -68,16 +68,14 @@ impl<S: Scalar> Series<S> {
     pub(crate) fn at_each(&self, sigmas: [S; BLOCK]) -> [S; BLOCK] {
         let squares = sigmas.map(|sigma| sigma * sigma);
         let (mut even, mut odd) = ([S::default(); BLOCK], [S::default(); BLOCK]);
-        for j in (0..=self.degree / 2).rev() {
-            let term = self.coefficients[2 * j];
-            for (even, square) in even.iter_mut().zip(squares) {
-                *even = *even * square + term;
-            }
-            if 2 * j < self.degree {
-                let term = self.coefficients[2 * j + 1];
-                for (odd, square) in odd.iter_mut().zip(squares) {
-                    *odd = *odd * square + term;
-                }
+        let (pairs, rest) = self.terms().as_chunks::<2>();
+        if let [last] = rest {
+            even = [*last; BLOCK];
+        }
+        for [first, second] in pairs.iter().rev() {
+            for i in 0..BLOCK {
+                even[i] = even[i] * squares[i] + *first;
+                odd[i] = odd[i] * squares[i] + *second;
             }
         }
         for ((even, odd), sigma) in even.iter_mut().zip(odd).zip(sigmas) {

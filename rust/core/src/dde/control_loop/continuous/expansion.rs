@@ -190,27 +190,34 @@ impl<S: Scalar> Expansion<S> {
         }
     }
 
-    /// The series of `row` x + `gain` w + `constant`.
-    pub(crate) fn combine(&self, row: &[S], gain: S, w: &Series<S>, constant: S) -> Series<S> {
-        let mut out = Series::constant(constant);
+    /// Make a series `row` x + `gain` w + `constant`.
+    #[inline]
+    pub(crate) fn combine(
+        &self,
+        row: &[S],
+        gain: S,
+        w: &Series<S>,
+        constant: S,
+        out: &mut Series<S>,
+    ) {
         out.set_degree(if gain.is_nothing() {
             self.degree
         } else {
             self.degree.max(w.degree)
         });
+        out.coefficients[..=out.degree].fill(S::default());
+        out.coefficients[0] = constant;
         match self.n {
-            1 => self.weigh(1, row, &mut out),
-            2 => self.weigh(2, row, &mut out),
-            3 => self.weigh(3, row, &mut out),
-            n => self.weigh(n, row, &mut out),
+            1 => self.weigh(1, row, out),
+            2 => self.weigh(2, row, out),
+            3 => self.weigh(3, row, out),
+            n => self.weigh(n, row, out),
         }
         if !gain.is_nothing() {
             for (sum, &w) in out.coefficients.iter_mut().zip(w.terms()) {
                 *sum += gain * w;
             }
         }
-        out.trim();
-        out
     }
 
     /// Add `row` x to `out`.

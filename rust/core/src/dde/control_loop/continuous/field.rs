@@ -11,7 +11,9 @@
 use crate::dde::control_loop::linear_loop::LinearLoop;
 use crate::dde::scalar::Scalar;
 
+use super::expansion::Expansion;
 use super::saturation::Side;
+use crate::dde::control_loop::series::Series;
 
 /// A signal of the loop.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,6 +79,11 @@ impl<S: Scalar> Signal<S> {
         let states = self.states.iter().zip(z);
         let sum = states.fold(self.constant, |sum, (&a, &z)| sum + a * z);
         sum + self.w * w + self.r * S::from(r)
+    }
+
+    /// Make `out` its series on an element.
+    pub(super) fn on(&self, x: &Expansion<S>, w: &Series<S>, r: f64, out: &mut Series<S>) {
+        x.combine(&self.states, self.w, w, self.forced(r), out);
     }
 
     /// What does not change with the states or w.

@@ -29,7 +29,7 @@ use super::field::{Field, Integral, Mode, Signal};
 use super::impulses::Impulses;
 use super::pieces::{Order, Orders, Pieces, REPORTED, SMOOTH};
 use super::saturation::{Side, Stretch, side_of, stretches};
-use crate::dde::control_loop::level_crossings::{crossings, value_at};
+use crate::dde::control_loop::level_crossings::{in_order, value_at};
 use crate::dde::control_loop::series::Series;
 
 /// Changes of mode without progress in time after which the mode is kept, because only rounding
@@ -77,6 +77,7 @@ pub(super) fn run<S: Scalar>(
         forced: Vec::new(),
         t: S::default(),
         w: Series::constant(S::default()),
+        series: [Series::constant(S::default()); 2],
         r: 0.0,
         changes: 0,
         orders: Orders::new(plant),
@@ -151,6 +152,8 @@ struct Run<'a, 'r, S: Scalar> {
     t: S,
     /// w on the element; zero without a delay.
     w: Series<S>,
+    /// v and y on the element.
+    series: [Series<S>; 2],
     r: f64,
     /// Changes of mode since time went on.
     changes: u32,
@@ -363,8 +366,11 @@ impl<S: Scalar> Run<'_, '_, S> {
 
     /// A signal on the element.
     fn series(&self, signal: &Signal<S>) -> Series<S> {
+        let mut out = Series::constant(S::default());
         let expansion = &self.fields[self.place].1;
-        expansion.combine(&signal.states, signal.w, &self.w, signal.forced(self.r))
+        signal.on(expansion, &self.w, self.r, &mut out);
+        out.trim();
+        out
     }
 
     /// Rounding errors of a signal on the element.
@@ -486,9 +492,7 @@ impl<S: Scalar> Run<'_, '_, S> {
         if least >= -noise {
             return None;
         }
-        let mut zeros = vec![0.0];
-        crossings(series, 0.0, &mut zeros);
-        zeros.sort_by(f64::total_cmp);
+        let mut zeros = in_order(series, [0.0], vec![0.0]);
         zeros.push(1.0);
         zeros.windows(2).find_map(|pair| {
             let (from, to) = (pair[0], pair[1]);
@@ -551,14 +555,16 @@ impl<S: Scalar> Run<'_, '_, S> {
         is_instant: bool,
     ) -> Result<(), Error> {
         let (t, delay, bounds) = (self.t, self.plant.delay(), self.plant.bounds());
+        let values = self.bounds();
         let until = next.value() - slack(t, delay);
-        let field = self.field();
+        let (field, expansion) = &self.fields[self.place];
         let is_limited = field.mode.is_limited();
-        let mut v = self.series(&field.v);
+        let [v, y] = &mut self.series;
+        field.v.on(expansion, &self.w, self.r, v);
+        v.trim();
         if self.requested.is_measured() || self.requested.next_output() < until {
-            let y = self.series(&field.y);
-            self.requested
-                .measure(t.value(), h.value(), end, &y.values());
+            field.y.on(expansion, &self.w, self.r, y);
+            self.requested.measure(t.value(), h.value(), end, y);
             self.requested
                 .output_blocks(until, |times| y.at_each(times.map(|time| (time - t) / h)));
         }
@@ -572,8 +578,8 @@ impl<S: Scalar> Run<'_, '_, S> {
             scale = S::from(1.0);
         }
         self.stretches.clear();
-        match self.bounds().filter(|_| self.is_cut) {
-            Some(bounds) if !is_instant => stretches(&v, bounds, &mut self.stretches),
+        match values.filter(|_| self.is_cut) {
+            Some(bounds) if !is_instant => stretches(v, bounds, &mut self.stretches),
             bounds => self.stretches.push(Stretch {
                 side: side_of(v.coefficients[0].value(), bounds),
                 start: 0.0,
@@ -603,7 +609,7 @@ impl<S: Scalar> Run<'_, '_, S> {
             piece.scale = scale;
             match (stretch.side, bounds) {
                 (1, Some((_, bound))) | (-1, Some((bound, _))) => piece.series.set_constant(bound),
-                _ => piece.series.copy_from(&v),
+                _ => piece.series.copy_from(v),
             }
             piece.order = order;
             pieces.push(piece)?;

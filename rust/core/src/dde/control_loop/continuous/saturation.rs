@@ -10,7 +10,7 @@
 
 use crate::dde::scalar::Scalar;
 
-use crate::dde::control_loop::level_crossings::{crossings, value_at};
+use crate::dde::control_loop::level_crossings::{in_order, value_at};
 use crate::dde::control_loop::linear_loop::Bounds;
 use crate::dde::control_loop::series::Series;
 
@@ -48,13 +48,8 @@ pub(super) fn stretches<S: Scalar>(u: &Series<S>, bounds: Bounds, out: &mut Vec<
     if high < bounds.0 {
         return out.push(whole(-1));
     }
-    let mut zeros = Vec::new();
-    for bound in [bounds.1, bounds.0] {
-        if bound.is_finite() {
-            crossings(u, bound, &mut zeros);
-        }
-    }
-    zeros.sort_by(f64::total_cmp);
+    let finite = [bounds.1, bounds.0].into_iter().filter(|b| b.is_finite());
+    let mut zeros = in_order(u, finite, Vec::new());
     zeros.push(1.0);
     let mut start = 0.0;
     for end in zeros {

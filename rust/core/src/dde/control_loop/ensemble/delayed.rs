@@ -65,7 +65,7 @@ impl<S: Simd, const N: usize> Delayed<S, N> {
         }
         let mut loops = Self {
             runs,
-            plants: Plants::new::<N>(simd, block, pair),
+            plants: Plants::new(simd, block, pair),
             k: block.column(simd, N * N + 2 * N, pair),
             l: block.number(simd, Number::L, pair),
             h,

@@ -1,7 +1,6 @@
 //! When the outputs reach the levels of the rise, and when they enter their band for the last time.
 
-use crate::dde::control_loop::level_crossings::crossings;
-use crate::dde::control_loop::series::Series;
+use crate::dde::control_loop::level_crossings::last_entry;
 use crate::simd::Simd;
 
 use super::search::Search;
@@ -121,7 +120,7 @@ impl<S: Simd> Search<'_, S> {
                     for lane in unknown.lanes() {
                         let until = of(&until, lane);
                         let bounds = (of(&(steady - band), lane), of(&(steady + band), lane));
-                        let last = last_entry(&self.series(lane), bounds, until);
+                        let last = last_entry(&self.series(lane), bounds, (0.0, until));
                         sigma.numbers_mut()[lane] = last.unwrap_or(until);
                     }
                 }
@@ -131,13 +130,4 @@ impl<S: Simd> Search<'_, S> {
             wanted = wanted & !done;
         }
     }
-}
-
-/// Where the polynomial last enters the band between two levels before `until`.
-fn last_entry(y: &Series, (low, high): (f64, f64), until: f64) -> Option<f64> {
-    let mut zeros = Vec::new();
-    crossings(y, low, &mut zeros);
-    crossings(y, high, &mut zeros);
-    let before = zeros.into_iter().filter(|&sigma| sigma <= until);
-    before.reduce(f64::max)
 }

@@ -6,7 +6,6 @@
 //! partial sums s_j. Where neither y′ nor y″ is shown to keep its sign in this way, the polynomial
 //! is examined by sign changes in the Bernstein basis instead.
 
-use crate::dde::control_loop::level_crossings::crossings;
 use crate::dde::control_loop::series::{DEGREE, Series};
 use crate::simd::{Mask, Real, Simd};
 
@@ -191,12 +190,4 @@ impl<S: Simd> Piece<S> {
         }
         series
     }
-}
-
-/// Zeros of the derivative in (0, 1), in order.
-pub(super) fn turns(y: &Series) -> Vec<f64> {
-    let mut zeros = Vec::new();
-    crossings(&y.derivative(), 0.0, &mut zeros);
-    zeros.sort_by(f64::total_cmp);
-    zeros
 }

@@ -4,12 +4,12 @@
 //! which something may happen, and where that depends on the inside of the part, asks its
 //! polynomial (`piece`), until no loop has such a part.
 
-use crate::dde::control_loop::level_crossings::crossings;
+use crate::dde::control_loop::level_crossings::in_order;
 use crate::dde::control_loop::series::Series;
 use crate::simd::{Mask, Real, Simd, outlined};
 
 use super::measured::Measured;
-use super::piece::{Asked, Piece, Shown, turns};
+use super::piece::{Asked, Piece, Shown};
 use super::spots::Spots;
 use super::trace::{Trace, of};
 use super::view::View;
@@ -89,8 +89,14 @@ impl<S: Simd> Trace<S> {
     fn part(&self, zero: Real<S>, part: usize) -> [Real<S>; 3] {
         let bulge = self.bulge_of(part).filter(|_| self.is_curved);
         let bulge = bulge.and_then(|place| self.bulges.get(place));
-        let [first, last] = [part, part + 1].map(|place| self.outputs.get(place));
-        [first, last, bulge].map(|lanes| lanes.map_or(zero, |lanes| Real::new(zero.simd(), *lanes)))
+        let mut found = [zero; 3];
+        let stored = [self.outputs.get(part), self.outputs.get(part + 1), bulge];
+        for (found, lanes) in found.iter_mut().zip(stored) {
+            if let Some(lanes) = lanes {
+                *found = Real::new(zero.simd(), *lanes);
+            }
+        }
+        found
     }
 }
 
@@ -266,7 +272,7 @@ impl<S: Simd> Search<'_, S> {
         }
         for lane in unknown.lanes() {
             let series = self.series(lane);
-            for sigma in turns(&series) {
+            for sigma in in_order(&series.derivative(), [0.0], Vec::new()) {
                 if sigma <= of(&until, lane) {
                     let mut output = until.constant(f64::NAN);
                     output.numbers_mut()[lane] = series.at(sigma);
@@ -290,17 +296,11 @@ impl<S: Simd> Search<'_, S> {
         let unknown = wanted & !sigma.eq(sigma);
         if unknown.any() {
             for lane in unknown.lanes() {
-                let first = first_crossing(&self.series(lane), of(&level, lane));
+                let zeros = in_order(&self.series(lane), [of(&level, lane)], Vec::new());
+                let first = zeros.first().copied();
                 sigma.numbers_mut()[lane] = first.unwrap_or(of(&until, lane));
             }
         }
         sigma
     }
-}
-
-/// Where the polynomial first passes through a level.
-fn first_crossing(y: &Series, level: f64) -> Option<f64> {
-    let mut zeros = Vec::new();
-    crossings(y, level, &mut zeros);
-    zeros.into_iter().reduce(f64::min)
 }

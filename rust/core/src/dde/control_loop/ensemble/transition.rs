@@ -87,14 +87,6 @@ impl<S: Simd, const N: usize> Held<S, N> {
             }
             norm = norm.larger(column);
         }
-        if !norm.gt(0.0).any() {
-            // The result of the series, at less cost.
-            return Self {
-                growth: [[zero; N]; N],
-                drive: scaled(drive, h),
-                push: scaled(push, h),
-            };
-        }
         let (mut scale, mut doublings) = (h.constant(1.0), zero);
         loop {
             let is_long = (norm * h * scale).gt(REACH);
@@ -106,7 +98,10 @@ impl<S: Simd, const N: usize> Held<S, N> {
         }
         let step = h * scale;
         let z = rescaled(a, step);
-        let mut phi = identity(h);
+        let mut phi = [[zero; N]; N];
+        for (i, row) in phi.iter_mut().enumerate() {
+            row[i] = h.constant(1.0);
+        }
         for j in (2..=TERMS).rev() {
             let part = 1.0 / f64::from(j);
             phi = rescaled(&product(&z, &phi), h.constant(part));
@@ -195,21 +190,6 @@ impl<S: Simd, const N: usize> Map<S, N> {
         out
     }
 
-    /// The first `P` states, which the others do not reach.
-    #[inline(always)]
-    pub(super) fn leading<const P: usize>(&self, zero: Real<S>) -> Map<S, P> {
-        let mut out = Map::<S, P>::nothing(zero);
-        for i in 0..P.min(N) {
-            for j in 0..P.min(N) {
-                out.growth[i][j] = self.growth[i][j];
-            }
-            out.before[i] = self.before[i];
-            out.after[i] = self.after[i];
-            out.push[i] = self.push[i];
-        }
-        out
-    }
-
     #[inline(always)]
     pub(super) fn apply(&self, x: &[Real<S>; N], before: Real<S>, after: Real<S>) -> [Real<S>; N] {
         let mut out = *x;
@@ -220,15 +200,6 @@ impl<S: Simd, const N: usize> Map<S, N> {
         }
         out
     }
-}
-
-#[inline(always)]
-fn identity<S: Simd, const N: usize>(like: Real<S>) -> Matrix<S, N> {
-    let mut out = [[like.constant(0.0); N]; N];
-    for (i, row) in out.iter_mut().enumerate() {
-        row[i] = like.constant(1.0);
-    }
-    out
 }
 
 /// The product of two matrices.
@@ -250,12 +221,8 @@ pub(super) fn product<S: Simd, const N: usize>(a: &Matrix<S, N>, b: &Matrix<S, N
 #[inline(always)]
 fn times<S: Simd, const N: usize>(a: &Matrix<S, N>, x: &[Real<S>; N]) -> [Real<S>; N] {
     let mut out = *x;
-    for (i, out) in out.iter_mut().enumerate() {
-        let mut sum = a[i][0] * x[0];
-        for inner in 1..N {
-            sum = a[i][inner].mul_add(x[inner], sum);
-        }
-        *out = sum;
+    for (out, a) in out.iter_mut().zip(a) {
+        *out = row(a, x, x[0].constant(0.0));
     }
     out
 }

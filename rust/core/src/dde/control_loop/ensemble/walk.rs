@@ -41,8 +41,8 @@ pub(super) trait Run<S: Simd> {
 }
 
 /// A run from rest.
-pub(super) struct Walk<'a, S: Simd, const N: usize, const P: usize> {
-    loops: &'a Loops<S, N, P>,
+pub(super) struct Walk<'a, S: Simd, const N: usize> {
+    loops: &'a Loops<S, N>,
     x: [Real<S>; N],
     output: Real<S>,
     /// The output at the last corner inside of the run.
@@ -53,9 +53,9 @@ pub(super) struct Walk<'a, S: Simd, const N: usize, const P: usize> {
     limited_until: Real<S>,
 }
 
-impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
+impl<'a, S: Simd, const N: usize> Walk<'a, S, N> {
     #[inline(always)]
-    pub(super) fn new(loops: &'a Loops<S, N, P>) -> Self {
+    pub(super) fn new(loops: &'a Loops<S, N>) -> Self {
         let runs = &loops.runs;
         Self {
             loops,
@@ -93,7 +93,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             zero.lanes(),
         );
         if loops.is_curved {
-            longer(&mut trace.states, SAMPLES * P, zero);
+            longer(&mut trace.states, SAMPLES * N, zero);
             longer(&mut trace.bulges, SAMPLES, zero.lanes());
         }
         trace.restart(self.number, self.output);
@@ -154,17 +154,17 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             if loops.is_curved {
                 let held = if is_late { after } else { before };
                 let mut bulge = (after - before).abs() * plants.bulge_of_jump;
-                for i in 0..P {
+                for i in 0..N {
                     let forced = plants.b[i].mul_add(held, plants.e[i]);
-                    let slope = row(&plants.a[i], &first(&x), forced);
+                    let slope = row(&plants.a[i], &x, forced);
                     bulge = slope.abs().mul_add(plants.bulge[i], bulge);
                 }
                 summary.bulge = summary.bulge.max(bulge);
                 if let Some(place) = trace.bulges.get_mut(sample) {
                     *place = bulge.lanes();
                 }
-                if let Some(places) = trace.states.get_mut(sample * P..(sample + 1) * P) {
-                    for i in 0..P {
+                if let Some(places) = trace.states.get_mut(sample * N..(sample + 1) * N) {
+                    for i in 0..N {
                         places[i] = x[i];
                     }
                 }
@@ -185,10 +185,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
                 if corner.is_after {
                     forced = corner.after.mul_add(after, forced);
                 }
-                if loops.is_pushed {
-                    forced = forced + corner.constant;
-                }
-                output = row(&corner.states, &first(&x), forced);
+                output = row(&corner.states, &x, forced + corner.constant);
                 if is_hidden && !(corner.is_after && number == loops.samples) {
                     output = loops.first_output;
                 }
@@ -216,8 +213,8 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             } else {
                 size = row(&x, &x, u.mul_add(u, size));
             }
-            output = plants.seen(&first(&x));
-            if loops.is_direct {
+            output = row(&plants.c, &x, loops.zero);
+            if loops.jump != usize::MAX {
                 output = loops.d.mul_add(after, output);
             }
             if is_hidden && number < loops.samples {
@@ -300,7 +297,7 @@ impl<S: Simd> Ends<S> {
     }
 }
 
-impl<S: Simd, const N: usize, const P: usize> Run<S> for Walk<'_, S, N, P> {
+impl<S: Simd, const N: usize> Run<S> for Walk<'_, S, N> {
     fn begin(&mut self, trace: &mut Trace<S>) {
         *self = Self::new(self.loops);
         begun(&self.loops.runs, trace);
@@ -352,14 +349,4 @@ pub(super) fn longer<T: Clone>(numbers: &mut Vec<T>, length: usize, zero: T) {
     if numbers.len() < length {
         numbers.resize(length, zero);
     }
-}
-
-/// The states of the plant.
-#[inline(always)]
-fn first<S: Simd, const N: usize, const P: usize>(x: &[Real<S>; N]) -> [Real<S>; P] {
-    let mut out = [x[0]; P];
-    for i in 0..P.min(N) {
-        out[i] = x[i];
-    }
-    out
 }

@@ -228,7 +228,7 @@ impl<S: Scalar> Walk<'_, '_, S> {
         let [u, before, after] = self.commands_of(k);
         let is_whole = into.is_nothing();
         let end = now + (early + late - into);
-        self.requested.inputs_before(end.value() - tolerance, |_| u);
+        self.requested.inputs_before(end.value() - tolerance, u);
         let mut at = now;
         // A length that is zero but has a slope counts as well.
         let is_early =
@@ -310,10 +310,9 @@ impl<S: Scalar> Walk<'_, '_, S> {
             }
         };
         // Most times of a record are those of samples, at which the output is known.
-        if !S::MOVES {
-            let known = until.min(from.value().next_up());
-            self.requested
-                .outputs_before(known, |_| equations.output(x, w));
+        let known = until.min(from.value().next_up());
+        if !S::MOVES && self.requested.next_output() < known {
+            self.requested.outputs_before(known, equations.output(x, w));
         }
         if self.requested.is_measured() || self.requested.next_output() < until {
             let window = span.window.get_or_init(|| Window::new(equations, length));

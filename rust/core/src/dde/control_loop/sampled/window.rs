@@ -108,7 +108,7 @@ impl<S: Scalar> Window<S> {
                     let (states, forced) = row.split_at(n);
                     *c = dot(states, &x) + dot(forced, &inputs);
                 }
-                requested.measure(from.value(), self.step.value(), 1.0, &y.values());
+                requested.measure(from.value(), self.step.value(), 1.0, &y);
                 requested.output_blocks(end, |times| {
                     let sigmas = times.map(|time| (time - from) * inverse);
                     y.at_each(sigmas.map(|sigma| sigma.pinned(sigma.value().max(0.0))))
