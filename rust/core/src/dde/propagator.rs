@@ -87,6 +87,7 @@ impl<S: Scalar> Propagator<S> {
     }
 
     /// `out` = Φ x + Σ Γ_i v_i.
+    #[inline]
     pub(crate) fn apply(&self, x: &[S], inputs: &[S], out: &mut [S]) {
         for (row, out) in out.iter_mut().enumerate() {
             let mut change = S::default();

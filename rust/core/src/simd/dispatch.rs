@@ -99,27 +99,21 @@ impl Instructions {
     }
 }
 
-/// A part of a kernel that is compiled once and called, where inlining it everywhere would make the
-/// kernel too large for the compiler. Implementations of `run` are `#[inline(always)]`.
-pub(crate) trait Outlined {
-    type Output;
+struct Call<F>(F);
 
-    fn run(self) -> Self::Output;
-}
-
-struct Call<T>(T);
-
-impl<T: Outlined> WithSimd for Call<T> {
-    type Output = T::Output;
+impl<T, F: FnOnce() -> T> WithSimd for Call<F> {
+    type Output = T;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> T::Output {
-        self.0.run()
+    fn with_simd<S: Simd>(self, _: S) -> T {
+        (self.0)()
     }
 }
 
-/// Run `part` with the instructions of `simd`, in a function of its own.
+/// Run `part` with the instructions of `simd`, in a function of its own: a part of a kernel that is
+/// compiled once and called, where inlining it everywhere would make the kernel too large for the
+/// compiler. Closures that are given are `#[inline(always)]`.
 #[inline(never)]
-pub(crate) fn outlined<S: Simd, T: Outlined>(simd: S, part: T) -> T::Output {
+pub(crate) fn outlined<S: Simd, T>(simd: S, part: impl FnOnce() -> T) -> T {
     simd.vectorize(Call(part))
 }

@@ -18,6 +18,6 @@ mod real;
 pub(crate) use columns::sweep_on;
 pub(crate) use columns::{Columns, Kernel, SHORT, sweep, sweep_along};
 pub(crate) use complex::Complex;
-pub(crate) use dispatch::{Instructions, Outlined, outlined};
+pub(crate) use dispatch::{Instructions, outlined};
 pub(crate) use pulp::Simd;
 pub(crate) use real::{Lanes, Mask, Real, flat, flat_mut};

@@ -3,10 +3,10 @@
 //! Between the zeros of a polynomial the integral of its modulus is a difference of its antiderivative,
 //! so that integrals are exact to rounding and depend on no grid of times.
 
-use super::level_crossings::crossings;
+use super::level_crossings::{corners, crossings, last_entry};
 use super::requested_output::Measure;
 use super::series::Series;
-use super::step_metrics::{may_turn, part_within};
+use super::step_metrics::part_within;
 
 /// What is measured of the deviation of an output from a level, over a time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -147,13 +147,10 @@ impl Measure for DeviationMetrics {
         let found = &mut self.found;
 
         let mut zeros = std::mem::take(&mut self.zeros);
-        zeros.clear();
-        if may_turn(&off) && high.max(-low) > found.peak {
-            crossings(&off.derivative(), 0.0, &mut zeros);
-        }
-        for sigma in zeros.drain(..).chain([from, to]) {
+        corners(&off, (from, to), high.max(-low) > found.peak, &mut zeros);
+        for sigma in zeros.drain(..) {
             let size = off.at(sigma).abs();
-            if (from..=to).contains(&sigma) && size > found.peak {
+            if size > found.peak {
                 (found.peak, found.peak_time) = (size, time(sigma));
             }
         }
@@ -179,14 +176,7 @@ impl Measure for DeviationMetrics {
             if found.recovery_time.is_nan() || off.at(from).abs() > band {
                 found.recovery_time = time(from);
             }
-            for (level, is_passed) in [(band, high > band), (-band, low < -band)] {
-                if is_passed {
-                    crossings(&off, level, &mut zeros);
-                }
-            }
-            let entries = zeros.drain(..);
-            let entry = entries.filter(|sigma| (from..=to).contains(sigma));
-            if let Some(entry) = entry.reduce(f64::max) {
+            if let Some(entry) = last_entry(&off, (-band, band), (from, to)) {
                 found.recovery_time = time(entry);
             }
         }

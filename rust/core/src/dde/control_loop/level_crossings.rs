@@ -57,6 +57,48 @@ pub(crate) fn crossings<S: Scalar>(u: &Series<S>, level: f64, zeros: &mut Vec<f6
     }
 }
 
+/// The zeros in order of u less each of some levels, after those that are there already.
+pub(crate) fn in_order<S: Scalar>(
+    u: &Series<S>,
+    levels: impl IntoIterator<Item = f64>,
+    mut zeros: Vec<f64>,
+) -> Vec<f64> {
+    for level in levels {
+        crossings(u, level, &mut zeros);
+    }
+    zeros.sort_by(f64::total_cmp);
+    zeros
+}
+
+/// The turning points of a polynomial inside a part of [0, 1], in order, between its ends; without them
+/// where they do not matter.
+pub(crate) fn corners(y: &Series, (from, to): (f64, f64), matters: bool, places: &mut Vec<f64>) {
+    places.clear();
+    if matters && may_turn(y) {
+        crossings(&y.derivative(), 0.0, places);
+        places.retain(|sigma| *sigma > from && *sigma < to);
+        places.sort_by(f64::total_cmp);
+    }
+    places.insert(0, from);
+    places.push(to);
+}
+
+/// May the derivative change its sign on [0, 1]?
+fn may_turn(y: &Series) -> bool {
+    let slopes = y.terms().iter().enumerate().skip(2);
+    let others: f64 = slopes.map(|(j, c)| j as f64 * c.abs()).sum();
+    y.degree > 1 && others >= y.coefficients[1].abs()
+}
+
+/// Where a polynomial last enters the band between two levels, in a part of [0, 1].
+pub(crate) fn last_entry(y: &Series, (low, high): (f64, f64), part: (f64, f64)) -> Option<f64> {
+    let (least, most) = y.range();
+    let passed = [(low, least < low), (high, most > high)];
+    let levels = passed.into_iter().filter(|(_, is_passed)| *is_passed);
+    let mut zeros = in_order(y, levels.map(|(level, _)| level), Vec::new()).into_iter();
+    zeros.rfind(|sigma| (part.0..=part.1).contains(sigma))
+}
+
 /// Bernstein coefficients on an interval of σ.
 #[derive(Debug, Clone, Copy)]
 struct Bernstein {

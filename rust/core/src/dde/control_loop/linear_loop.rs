@@ -165,27 +165,24 @@ impl<S: Scalar> LinearLoop<S> {
         limit: Option<S>,
     ) -> Result<Self, Error> {
         let n = equations.states();
-        let lengths = [
-            ("A", equations.a.len(), n * n),
-            ("E", equations.e.len(), n),
-            ("K", equations.k.len(), n),
-            ("C", equations.c.len(), n),
-            ("G", equations.excess.len().max(n), n),
-            ("the inputs", equations.impulses.len().max(n), n),
+        let (excess, inputs) = (equations.excess.len(), equations.impulses.len());
+        let columns = [
+            ("A", &equations.a, n * n),
+            ("B", &equations.b, n),
+            ("E", &equations.e, n),
+            ("K", &equations.k, n),
+            ("C", &equations.c, n),
+            ("G", &equations.excess, if excess > 0 { n } else { 0 }),
+            ("impulses", &equations.impulses, inputs.min(n)),
         ];
-        for (name, found, wanted) in lengths {
+        for (name, entries, wanted) in columns {
             refuse_if!(
-                found != wanted,
-                "{name} has {found} elements, but {wanted} are needed for {n} states"
+                entries.len() != wanted,
+                "{name} has {} elements, but {wanted} are needed for {n} states",
+                entries.len()
             );
+            finite(name, entries)?;
         }
-        finite("A", &equations.a)?;
-        finite("B", &equations.b)?;
-        finite("E", &equations.e)?;
-        finite("K", &equations.k)?;
-        finite("C", &equations.c)?;
-        finite("G", &equations.excess)?;
-        finite("impulses", &equations.impulses)?;
         finite(
             "L, M, D, impulse",
             &[equations.l, equations.m, equations.d, equations.impulse],

@@ -81,9 +81,9 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
     }
 
     /// The output is `y` of (t − `start`)/`length`, from 0 to `end`.
-    pub(crate) fn measure(&mut self, start: f64, length: f64, end: f64, y: &Series) {
+    pub(crate) fn measure(&mut self, start: f64, length: f64, end: f64, y: &Series<S>) {
         if let Some(metrics) = &mut self.metrics {
-            metrics.segment(start, length, end, y);
+            metrics.segment(start, length, end, &y.values());
         }
     }
 
@@ -111,24 +111,15 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
         last(self.output_times).max(last(self.input_times))
     }
 
-    /// Store the outputs at all times before `end`.
-    pub(crate) fn outputs_before(&mut self, end: f64, mut value: impl FnMut(S) -> S) {
-        while let Some(&t) = self.output_times.get(self.trajectory.outputs.len()) {
-            if t >= end {
-                break;
-            }
-            self.trajectory.outputs.push(value(self.ahead.pinned(t)));
-        }
+    /// Store one value as the outputs at all times before `end`.
+    pub(crate) fn outputs_before(&mut self, end: f64, value: S) {
+        let outputs = &mut self.trajectory.outputs;
+        blocks_before(end, self.output_times, outputs, S::from, |_| [value; BLOCK]);
     }
 
-    /// Store the inputs at all times before `end`.
-    pub(crate) fn inputs_before(&mut self, end: f64, mut value: impl FnMut(S) -> S) {
-        while let Some(&t) = self.input_times.get(self.trajectory.inputs.len()) {
-            if t >= end {
-                break;
-            }
-            self.trajectory.inputs.push(value(S::from(t)));
-        }
+    /// Store one value as the inputs at all times before `end`.
+    pub(crate) fn inputs_before(&mut self, end: f64, value: S) {
+        self.input_blocks(end, |_| [value; BLOCK]);
     }
 
     /// Store the outputs at all times before `end`, several at once.

@@ -41,36 +41,6 @@ pub(crate) fn horner<S: Scalar>(
 /// Number of values that are computed at once.
 pub(crate) const BLOCK: usize = 4;
 
-/// [`horner`] at several σ: the sums of one do not wait for those of another.
-#[inline]
-pub(crate) fn horner_each<S: Scalar>(
-    terms: &[S],
-    offset: usize,
-    stride: usize,
-    degree: usize,
-    sigmas: [S; BLOCK],
-) -> [S; BLOCK] {
-    let squares = sigmas.map(|sigma| sigma * sigma);
-    let (mut even, mut odd) = ([S::default(); BLOCK], [S::default(); BLOCK]);
-    for j in (0..=degree / 2).rev() {
-        let place = offset + 2 * j * stride;
-        let term = terms[place];
-        for (even, square) in even.iter_mut().zip(squares) {
-            *even = *even * square + term;
-        }
-        if 2 * j < degree {
-            let term = terms[place + stride];
-            for (odd, square) in odd.iter_mut().zip(squares) {
-                *odd = *odd * square + term;
-            }
-        }
-    }
-    for ((even, odd), sigma) in even.iter_mut().zip(odd).zip(sigmas) {
-        *even += odd * sigma;
-    }
-    even
-}
-
 /// Coefficients of σ^j; those above `degree` are zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Series<S = f64> {
@@ -92,9 +62,26 @@ impl<S: Scalar> Series<S> {
         &self.coefficients[..=self.degree]
     }
 
-    /// Values at several σ, each with the bits of [`Series::at`].
+    /// Values at several σ, each with the bits of [`Series::at`]: the sums of one do not wait for
+    /// those of another.
+    #[inline]
     pub(crate) fn at_each(&self, sigmas: [S; BLOCK]) -> [S; BLOCK] {
-        horner_each(&self.coefficients, 0, 1, self.degree, sigmas)
+        let squares = sigmas.map(|sigma| sigma * sigma);
+        let (mut even, mut odd) = ([S::default(); BLOCK], [S::default(); BLOCK]);
+        let (pairs, rest) = self.terms().as_chunks::<2>();
+        if let [last] = rest {
+            even = [*last; BLOCK];
+        }
+        for [first, second] in pairs.iter().rev() {
+            for i in 0..BLOCK {
+                even[i] = even[i] * squares[i] + *first;
+                odd[i] = odd[i] * squares[i] + *second;
+            }
+        }
+        for ((even, odd), sigma) in even.iter_mut().zip(odd).zip(sigmas) {
+            *even += odd * sigma;
+        }
+        even
     }
 
     /// Value at σ.
@@ -156,6 +143,12 @@ impl<S: Scalar> Series<S> {
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.set_degree(other.degree);
         self.coefficients[..=other.degree].copy_from_slice(other.terms());
+    }
+
+    /// Become a constant.
+    pub(crate) fn set_constant(&mut self, value: S) {
+        self.set_degree(0);
+        self.coefficients[0] = value;
     }
 
     /// Make room for terms up to `degree`, which the caller writes; those above become zero.

@@ -6,7 +6,7 @@
 //! grid of times. A polynomial whose range, bounded by its coefficients, cannot change any metric
 //! is skipped.
 
-use super::level_crossings::crossings;
+use super::level_crossings::{corners, last_entry};
 use super::metrics::{Criteria, Levels, Metrics, Record};
 use super::requested_output::Measure;
 use super::series::Series;
@@ -131,15 +131,8 @@ impl Measure for StepMetrics {
         let mut zeros = std::mem::take(&mut self.zeros);
 
         // The points at which the output may be greatest or least, in order.
-        zeros.clear();
-        if may_turn(y) && self.concerns(&levels, low, high) {
-            crossings(&y.derivative(), 0.0, &mut zeros);
-            zeros.retain(|&sigma| sigma > from && sigma < to);
-            zeros.sort_by(f64::total_cmp);
-        }
-        zeros.insert(0, from);
-        zeros.push(to);
-
+        let matters = self.concerns(&levels, low, high);
+        corners(y, (from, to), matters, &mut zeros);
         self.rise(&levels, y, &zeros, time);
         for &sigma in &zeros {
             let (value, at) = (y.at(sigma), time(sigma).max(0.0));
@@ -163,15 +156,8 @@ impl Measure for StepMetrics {
             if self.record.inside_since.is_nan() || outside(begin) {
                 self.record.inside_since = begins_at;
             }
-            zeros.clear();
-            if low < levels.steady - levels.band {
-                crossings(y, levels.steady - levels.band, &mut zeros);
-            }
-            if high > levels.steady + levels.band {
-                crossings(y, levels.steady + levels.band, &mut zeros);
-            }
-            let entry = zeros.iter().filter(|&&sigma| sigma >= from && sigma <= to);
-            if let Some(entry) = entry.copied().reduce(f64::max) {
+            let band = (levels.steady - levels.band, levels.steady + levels.band);
+            if let Some(entry) = last_entry(y, band, (from, to)) {
                 self.record.inside_since = time(entry).min(ends_at);
             }
         }
@@ -198,13 +184,6 @@ pub(crate) fn part_within(
         to = to.max(0.0);
     }
     (from <= to).then_some((from, to))
-}
-
-/// May the derivative change its sign on [0, 1]?
-pub(crate) fn may_turn(y: &Series) -> bool {
-    let slopes = y.terms().iter().enumerate().skip(2);
-    let others: f64 = slopes.map(|(j, c)| j as f64 * c.abs()).sum();
-    y.degree > 1 && others >= y.coefficients[1].abs()
 }
 
 #[cfg(test)]

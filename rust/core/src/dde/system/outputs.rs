@@ -7,14 +7,6 @@ use crate::Error;
 use crate::dde::limits::{RESPONSE, slack};
 use crate::memory::{push, reserved};
 
-/// The signals of a run, as far as they are known.
-#[derive(Debug)]
-pub(super) struct Signals<'a> {
-    pub(super) state: &'a Track,
-    pub(super) slope: &'a Track,
-    pub(super) input: &'a Track,
-}
-
 /// The requested times and the values so far.
 #[derive(Debug)]
 pub(super) struct Outputs<'a> {
@@ -65,8 +57,8 @@ impl<'a> Outputs<'a> {
         self.times.last().copied().unwrap_or(0.0)
     }
 
-    /// Store the values at the times before `end`.
-    pub(super) fn before(&mut self, end: f64, signals: &Signals<'_>) {
+    /// Store the values at the times before `end`, of the state, its derivative and the input.
+    pub(super) fn before(&mut self, end: f64, signals: [&Track; 3]) {
         while let Some(&t) = self.times.get(self.served) {
             if t >= end {
                 break;
@@ -75,26 +67,22 @@ impl<'a> Outputs<'a> {
         }
     }
 
-    fn serve(&mut self, t: f64, signals: &Signals<'_>) {
+    fn serve(&mut self, t: f64, signals: [&Track; 3]) {
         let tolerance = slack(t, self.longest);
+        let [states, _, inputs] = signals;
         let [state, input] = &mut self.places;
-        signals.state.seek(state, t, tolerance);
-        signals.input.seek(input, t, tolerance);
+        states.seek(state, t, tolerance);
+        inputs.seek(input, t, tolerance);
         let found = &mut self.found;
-        found
-            .states
-            .extend((0..self.n).map(|i| signals.state.at(*state, t, i)));
-        found
-            .inputs
-            .extend((0..self.p).map(|i| signals.input.at(*input, t, i)));
+        let state = (0..self.n).map(|i| states.at(*state, t, i));
+        found.states.extend(state);
+        let input = (0..self.p).map(|i| inputs.at(*input, t, i));
+        found.inputs.extend(input);
         let first = found.outputs.len();
         found.outputs.resize(first + self.q, 0.0);
         let y = &mut found.outputs[first..];
-        for (feeds, track) in [
-            (&mut self.state, signals.state),
-            (&mut self.slope, signals.slope),
-            (&mut self.direct, signals.input),
-        ] {
+        let feeds = [&mut self.state, &mut self.slope, &mut self.direct];
+        for (feeds, track) in feeds.into_iter().zip(signals) {
             for feed in feeds {
                 feed.add_value(track, t, self.longest, y);
             }

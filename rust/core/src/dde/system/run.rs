@@ -8,7 +8,7 @@ use super::equations::{Past, Signal, SystemEquations, SystemResponse};
 use super::input_breaks::{first_break, passed_breaks};
 use super::jumps::{Jumps, Scale};
 use super::legendre::TERMS;
-use super::outputs::{Outputs, Signals};
+use super::outputs::Outputs;
 use super::terms;
 use super::terms::Feed;
 use super::track::{KINDS, Piece, Track};
@@ -170,12 +170,8 @@ pub(super) fn run(
             &mut x,
         );
         check_growth(&x, next)?;
-        let signals = Signals {
-            state: &states,
-            slope: &slopes,
-            input: &inputs.track,
-        };
-        outputs.before(next - slack(next, longest), &signals);
+        let tracks = [&states, &slopes, &inputs.track];
+        outputs.before(next - slack(next, longest), tracks);
         let old = t - longest - 2.0 * tolerance;
         states.forget(old);
         slopes.forget(old);
@@ -188,12 +184,7 @@ pub(super) fn run(
     let sizes = vec![[0.0; KINDS]; n];
     states.push(t, f64::INFINITY, 0, &constants(&x), &sizes);
     slopes.push(t, f64::INFINITY, 0, &constants(&f), &sizes);
-    let signals = Signals {
-        state: &states,
-        slope: &slopes,
-        input: &inputs.track,
-    };
-    outputs.before(f64::INFINITY, &signals);
+    outputs.before(f64::INFINITY, [&states, &slopes, &inputs.track]);
     Ok(outputs.finish())
 }
 

@@ -9,7 +9,7 @@
 //!
 //! For one integrator and m = 1 they have a closed form ([`super::slopes`]). Where the last coefficients
 //! are not negligible, elements become half as long from there on; a loop that needs more than
-//! [`MOST_PARTS`] of them, or leaves its closed form, is left to [`super::delayed`]. The code is
+//! [`MOST_PARTS`] of them, or leaves its closed form, is left to [`super::modes`]. The code is
 //! compiled for each instruction set: all operations are rounded one by one, in one order, and have
 //! the same bits in each.
 
@@ -24,9 +24,8 @@ use crate::dde::scalar::Scalar;
 use crate::simd::Instructions;
 use crate::{Error, Task};
 
-use super::delayed::Orders;
 use super::effort::watch;
-use super::pieces::{REPORTED, SMOOTH};
+use super::pieces::{Orders, REPORTED, SMOOTH};
 use super::polynomial::{LANES, Polynomial};
 use super::slopes::Slopes;
 use super::values_at_times::ValuesAtTimes;

@@ -1,7 +1,6 @@
 //! The Taylor expansion of the state on one element.
 
-use crate::dde::control_loop::linear_loop::Equations;
-use crate::dde::control_loop::series::{BLOCK, DEGREE, NEGLIGIBLE, Series, horner, horner_each};
+use crate::dde::control_loop::series::{DEGREE, NEGLIGIBLE, Series, horner};
 use crate::dde::scalar::Scalar;
 
 /// A state this small throughout its element counts as zero, so that subnormal numbers, which have
@@ -191,44 +190,16 @@ impl<S: Scalar> Expansion<S> {
         }
     }
 
-    /// y at several σ.
-    pub(crate) fn outputs_at(
-        &self,
-        equations: &Equations<S>,
-        w: &Series<S>,
-        sigmas: [S; BLOCK],
-    ) -> [S; BLOCK] {
-        let mut outputs = [S::default(); BLOCK];
-        let mut add = |gain: S, values: [S; BLOCK]| {
-            for (y, value) in outputs.iter_mut().zip(values) {
-                *y += gain * value;
-            }
-        };
-        for (i, &c) in equations.c.iter().enumerate() {
-            if !c.is_nothing() {
-                let states = match self.n {
-                    1 => horner_each(&self.terms, 0, 1, self.degree, sigmas),
-                    n => horner_each(&self.terms, i, n, self.degree, sigmas),
-                };
-                add(c, states);
-            }
-        }
-        if !equations.d.is_nothing() {
-            add(equations.d, w.at_each(sigmas));
-        }
-        outputs
-    }
-
-    /// The series of `row` x + `gain` w + `constant`.
-    pub(crate) fn combine(&self, row: &[S], gain: S, w: &Series<S>, constant: S) -> Series<S> {
-        let mut out = Series::constant(constant);
-        self.combine_into(row, gain, w, constant, &mut out);
-        out
-    }
-
-    /// [`Expansion::combine`] in the place of another series.
+    /// Make a series `row` x + `gain` w + `constant`.
     #[inline]
-    fn combine_into(&self, row: &[S], gain: S, w: &Series<S>, constant: S, out: &mut Series<S>) {
+    pub(crate) fn combine(
+        &self,
+        row: &[S],
+        gain: S,
+        w: &Series<S>,
+        constant: S,
+        out: &mut Series<S>,
+    ) {
         out.set_degree(if gain.is_nothing() {
             self.degree
         } else {
@@ -247,7 +218,6 @@ impl<S: Scalar> Expansion<S> {
                 *sum += gain * w;
             }
         }
-        out.trim();
     }
 
     /// Add `row` x to `out`.
@@ -270,22 +240,6 @@ impl<S: Scalar> Expansion<S> {
                 terms.map(|(&k, &x)| (k * x).value().abs()).sum::<f64>()
             })
             .sum()
-    }
-
-    /// Write u on the element.
-    pub(crate) fn command(
-        &self,
-        equations: &Equations<S>,
-        w: &Series<S>,
-        r: f64,
-        u: &mut Series<S>,
-    ) {
-        self.combine_into(&equations.k, equations.l, w, equations.m * S::from(r), u);
-    }
-
-    /// y on the element.
-    pub(crate) fn output(&self, equations: &Equations<S>, w: &Series<S>) -> Series<S> {
-        self.combine(&equations.c, equations.d, w, S::default())
     }
 }
 

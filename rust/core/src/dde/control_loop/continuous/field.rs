@@ -11,6 +11,10 @@
 use crate::dde::control_loop::linear_loop::LinearLoop;
 use crate::dde::scalar::Scalar;
 
+use super::expansion::Expansion;
+use super::saturation::Side;
+use crate::dde::control_loop::series::Series;
+
 /// A signal of the loop.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Signal<S> {
@@ -77,14 +81,16 @@ impl<S: Scalar> Signal<S> {
         sum + self.w * w + self.r * S::from(r)
     }
 
+    /// Make `out` its series on an element.
+    pub(super) fn on(&self, x: &Expansion<S>, w: &Series<S>, r: f64, out: &mut Series<S>) {
+        x.combine(&self.states, self.w, w, self.forced(r), out);
+    }
+
     /// What does not change with the states or w.
     pub(super) fn forced(&self, r: f64) -> S {
         self.constant + self.r * S::from(r)
     }
 }
-
-/// Where the command is relative to a bound: −1 below the least, 1 above the greatest, 0 within.
-pub(super) type Side = i8;
 
 /// What the integral does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,13 +7,13 @@
 //! is shortened until the last ones are below rounding. u is cut exactly where it crosses ±limit,
 //! and the cut pieces, shifted by Td, are added to the queue. Breaking points are therefore element
 //! ends by construction. Without a delay, or where the command at a bound changes how the states move,
-//! elements end where the mode of the command changes ([`modes`]). Without a limit, and under a reference that stays constant after the start, breaking
-//! points lie at whole delays, and elements are equal parts of one ([`aligned`]). Guaranteed: truncation below rounding, no crossing of the limit missed, switching
-//! times to rounding. Not guaranteed: speed where the delay or a lag is tiny against the time
+//! elements end where the mode of the command changes ([`modes`] does both). Without a limit, and under
+//! a reference that stays constant after the start, breaking points lie at whole delays, and elements
+//! are equal parts of one ([`aligned`]). Guaranteed: truncation below rounding, no crossing of the limit
+//! missed, switching times to rounding. Not guaranteed: speed where the delay or a lag is tiny against the time
 //! simulated (elements are no longer than either allows), or where many breaks accumulate.
 
 mod aligned;
-mod delayed;
 mod effort;
 mod expansion;
 mod field;

@@ -1,4 +1,8 @@
-//! The loop whose command at its bounds changes how its states move, and the loop without a delay.
+//! The loop in continuous time, element by element.
+//!
+//! With a delay, the command that arrives is known. Where bounds change nothing but the command, elements do
+//! not end there: the command is cut, and its parts are added to the queue ([`saturation`](super::saturation)).
+//! In all other loops the state moves otherwise while the command is at a bound, or there is no delay.
 //!
 //! In each mode of the command the loop is linear ([`field`](super::field)), and an element ends where a
 //! signal leaves the mode: the command reaches or leaves a bound, its rate reaches the bound on that, a
@@ -12,19 +16,20 @@
 //! follows from that (Filippov 1960). Which mode follows depends on all that moves in the element before
 //! it: elements, modes and their changes are one state machine, and one file.
 
-use crate::dde::control_loop::linear_loop::{LinearLoop, Start};
+use crate::dde::control_loop::linear_loop::{LinearLoop, Start, saturate};
 use crate::dde::control_loop::reference::{Cursor, Reference};
 use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
 use crate::dde::limits::{check_growth, slack};
 use crate::dde::scalar::{Scalar, is_reached};
 use crate::{Error, Task};
 
-use super::delayed::Orders;
 use super::effort::watch;
 use super::expansion::Expansion;
-use super::field::{Field, Integral, Mode, Side, Signal};
-use super::pieces::{Pieces, REPORTED, SMOOTH};
-use crate::dde::control_loop::level_crossings::{crossings, value_at};
+use super::field::{Field, Integral, Mode, Signal};
+use super::impulses::Impulses;
+use super::pieces::{Order, Orders, Pieces, REPORTED, SMOOTH};
+use super::saturation::{Side, Stretch, side_of, stretches};
+use crate::dde::control_loop::level_crossings::{in_order, value_at};
 use crate::dde::control_loop::series::Series;
 
 /// Changes of mode without progress in time after which the mode is kept, because only rounding
@@ -63,11 +68,16 @@ pub(super) fn run<S: Scalar>(
         fields: Vec::new(),
         place: 0,
         pieces: is_delayed.then(|| Pieces::new(start.command, plant.delay())),
+        is_cut: is_delayed && !plant.is_watched(),
+        side: 0,
+        stretches: Vec::new(),
+        impulses: Impulses::default(),
         cursor,
         z,
         forced: Vec::new(),
         t: S::default(),
         w: Series::constant(S::default()),
+        series: [Series::constant(S::default()); 2],
         r: 0.0,
         changes: 0,
         orders: Orders::new(plant),
@@ -129,6 +139,12 @@ struct Run<'a, 'r, S: Scalar> {
     place: usize,
     /// None without a delay.
     pieces: Option<Pieces<S>>,
+    /// Are the states the same on both sides of a bound, so that the command alone is cut there?
+    is_cut: bool,
+    /// Of a command that is cut, the side of its bounds, and the intervals of the element.
+    side: Side,
+    stretches: Vec<Stretch>,
+    impulses: Impulses<S>,
     cursor: Cursor<'a>,
     z: Vec<S>,
     /// What acts on z′ besides z and w.
@@ -136,6 +152,8 @@ struct Run<'a, 'r, S: Scalar> {
     t: S,
     /// w on the element; zero without a delay.
     w: Series<S>,
+    /// v and y on the element.
+    series: [Series<S>; 2],
     r: f64,
     /// Changes of mode since time went on.
     changes: u32,
@@ -170,19 +188,17 @@ impl<S: Scalar> Run<'_, '_, S> {
             .as_mut()
             .map_or(SMOOTH, |pieces| pieces.reach(t));
         let jumps = is_first || is_reached(S::from(self.cursor.next_jump()), t, tolerance);
-        let mut is_kicked = false;
-        if jumps {
-            is_kicked = self.jump(tolerance);
-        }
+        let is_kicked = self.jump(jumps, tolerance);
         let stop = self.stop(tolerance);
         let mut h = stop - t;
         let mut next = stop;
-        // As without modes: events at one time that move at different speeds.
+        // Events at one time that move at different speeds: the element between them has length
+        // zero, but its length has a derivative. It passes the command on and provides no output.
         let is_instant = S::MOVES && self.pieces.is_some() && h.value() <= tolerance;
         if is_instant {
             h = h.pinned(0.0);
         }
-        if jumps {
+        if jumps && !self.is_cut {
             let at_start = self.arrives();
             self.settle(at_start);
         }
@@ -228,18 +244,7 @@ impl<S: Scalar> Run<'_, '_, S> {
         if is_kicked || self.orders.of_output(arriving, jumps) <= REPORTED {
             self.requested.output_break(t)?;
         }
-        if order <= REPORTED {
-            self.requested.input_break(t)?;
-        }
-        let v = self.emit(h, next, (end, order), is_instant)?;
-        self.fields[self.place].1.end(S::from(end), &mut self.z);
-        if self.plant.rate().is_some()
-            && !is_instant
-            && let Some(place) = self.z.last_mut()
-        {
-            *place = v;
-        }
-        check_growth(&self.z, S::default(), next)?;
+        self.emit(h, next, (end, order), is_instant)?;
         self.t = next;
         if let Some(change) = change {
             self.leave(change);
@@ -251,34 +256,43 @@ impl<S: Scalar> Run<'_, '_, S> {
         Ok(())
     }
 
-    /// Let reference and inputs jump; does an input?
-    fn jump(&mut self, tolerance: f64) -> bool {
-        let equations = self.plant.equations();
-        let before = self.cursor.value();
-        self.r = self.cursor.advance(self.t.value(), tolerance);
-        let n = equations.states();
-        let states = &mut self.z[..n];
-        let kicked = self
-            .cursor
-            .kick(self.t.value(), tolerance, equations, states);
-        let is_bounded = self.plant.bounds().is_some() || self.plant.rate().is_some();
-        let mut is_kicked = kicked.is_some();
-        if !is_bounded && self.pieces.is_none() {
-            let made = equations.impulse * S::from(self.r - before) + kicked.unwrap_or_default();
-            let struck = made / (S::from(1.0) - equations.l);
-            is_kicked |= !struck.is_nothing();
-            for (z, &b) in self.z.iter_mut().zip(&equations.b) {
-                *z += b * struck;
+    /// Let reference and inputs jump, and impulses arrive; do states jump?
+    fn jump(&mut self, jumps: bool, tolerance: f64) -> bool {
+        let (t, equations) = (self.t, self.plant.equations());
+        let mut struck = self.impulses.arrived(t, tolerance);
+        let mut made = S::default();
+        let mut is_kicked = false;
+        if jumps {
+            let before = self.cursor.value();
+            self.r = self.cursor.advance(t.value(), tolerance);
+            let states = &mut self.z[..equations.states()];
+            let kicked = self.cursor.kick(t.value(), tolerance, equations, states);
+            is_kicked = kicked.is_some();
+            if self.plant.bounds().is_none() && self.plant.rate().is_none() {
+                made = equations.impulse * S::from(self.r - before) + kicked.unwrap_or_default();
             }
         }
-        is_kicked
+        if self.pieces.is_some() {
+            let arrival = t + self.plant.delay();
+            self.impulses.push(arrival, made + equations.l * struck);
+        } else {
+            struck = made / (S::from(1.0) - equations.l);
+        }
+        for (z, &b) in self.z.iter_mut().zip(&equations.b) {
+            *z += b * struck;
+        }
+        is_kicked || !struck.is_nothing()
     }
 
     /// The end of the next element, at the latest.
     fn stop(&self, tolerance: f64) -> S {
         let jump = S::from(self.cursor.next_jump());
         match &self.pieces {
-            Some(pieces) => pieces.front().end.earlier(jump),
+            Some(pieces) => pieces
+                .front()
+                .end
+                .earlier(jump)
+                .earlier(self.impulses.next()),
             None => {
                 let end = S::from(self.cursor.next_jump().min(self.horizon));
                 let left = end - self.t;
@@ -304,9 +318,7 @@ impl<S: Scalar> Run<'_, '_, S> {
             ..Mode::FREE
         });
         let u = self.field().u.at(&self.z, w, self.r).value();
-        let side = self.plant.bounds().map_or(0, |(low, high)| {
-            i8::from(u > high.value()) - i8::from(u < low.value())
-        });
+        let side = side_of(u, self.bounds());
         if self.plant.rate().is_some() {
             let aim = match (side, self.plant.bounds()) {
                 (1, Some((_, high))) => high.value(),
@@ -354,8 +366,11 @@ impl<S: Scalar> Run<'_, '_, S> {
 
     /// A signal on the element.
     fn series(&self, signal: &Signal<S>) -> Series<S> {
+        let mut out = Series::constant(S::default());
         let expansion = &self.fields[self.place].1;
-        expansion.combine(&signal.states, signal.w, &self.w, signal.forced(self.r))
+        signal.on(expansion, &self.w, self.r, &mut out);
+        out.trim();
+        out
     }
 
     /// Rounding errors of a signal on the element.
@@ -368,7 +383,7 @@ impl<S: Scalar> Run<'_, '_, S> {
 
     /// The first change of mode on the element.
     fn change(&self, h: S) -> Option<Change> {
-        if self.plant.bounds().is_none() && self.plant.rate().is_none() {
+        if self.is_cut || (self.plant.bounds().is_none() && self.plant.rate().is_none()) {
             return None;
         }
         let mode = self.field().mode;
@@ -477,9 +492,7 @@ impl<S: Scalar> Run<'_, '_, S> {
         if least >= -noise {
             return None;
         }
-        let mut zeros = vec![0.0];
-        crossings(series, 0.0, &mut zeros);
-        zeros.sort_by(f64::total_cmp);
+        let mut zeros = in_order(series, [0.0], vec![0.0]);
         zeros.push(1.0);
         zeros.windows(2).find_map(|pair| {
             let (from, to) = (pair[0], pair[1]);
@@ -527,48 +540,88 @@ impl<S: Scalar> Run<'_, '_, S> {
         }
     }
 
-    /// Store and pass on what happens on the element; returns v at its end.
+    /// The values of the bounds.
+    fn bounds(&self) -> Option<(f64, f64)> {
+        let bounds = self.plant.bounds();
+        bounds.map(|(low, high)| (low.value(), high.value()))
+    }
+
+    /// Store and pass on what happens on the element, and go to its end.
     fn emit(
         &mut self,
         h: S,
         next: S,
-        (end, order): (f64, u8),
+        (end, mut order): (f64, Order),
         is_instant: bool,
-    ) -> Result<S, Error> {
-        let (t, delay) = (self.t, self.plant.delay());
-        let tolerance = slack(t, delay);
-        let field = self.field();
-        let mut v = self.series(&field.v);
-        let y = self.series(&field.y);
+    ) -> Result<(), Error> {
+        let (t, delay, bounds) = (self.t, self.plant.delay(), self.plant.bounds());
+        let values = self.bounds();
+        let until = next.value() - slack(t, delay);
+        let (field, expansion) = &self.fields[self.place];
         let is_limited = field.mode.is_limited();
-        if self.requested.is_measured() {
+        let [v, y] = &mut self.series;
+        field.v.on(expansion, &self.w, self.r, v);
+        v.trim();
+        if self.requested.is_measured() || self.requested.next_output() < until {
+            field.y.on(expansion, &self.w, self.r, y);
+            self.requested.measure(t.value(), h.value(), end, y);
             self.requested
-                .measure(t.value(), h.value(), end, &y.values());
+                .output_blocks(until, |times| y.at_each(times.map(|time| (time - t) / h)));
         }
-        if is_limited {
-            self.requested.limited(t, next);
+        self.requested.input_blocks(until, |times| {
+            let values = v.at_each(times.map(|time| (time - t) / h));
+            values.map(|v| saturate(v, bounds))
+        });
+        let mut scale = h;
+        if is_instant {
+            v.set_degree(0);
+            scale = S::from(1.0);
         }
-        let until = next.value() - tolerance;
-        self.requested
-            .output_blocks(until, |times| y.at_each(times.map(|time| (time - t) / h)));
-        self.requested
-            .input_blocks(until, |times| v.at_each(times.map(|time| (time - t) / h)));
-        if let Some(pieces) = &mut self.pieces {
-            let mut scale = h;
-            if is_instant {
-                v.set_degree(0);
-                scale = S::from(1.0);
+        self.stretches.clear();
+        match values.filter(|_| self.is_cut) {
+            Some(bounds) if !is_instant => stretches(v, bounds, &mut self.stretches),
+            bounds => self.stretches.push(Stretch {
+                side: side_of(v.coefficients[0].value(), bounds),
+                start: 0.0,
+                end,
+            }),
+        }
+        for stretch in &self.stretches {
+            if stretch.side != self.side {
+                order = order.min(1);
+                self.side = stretch.side;
             }
+            let (into, last) = (S::from(stretch.start) * h, S::from(stretch.end) * h);
+            let last = if stretch.end >= end { next } else { t + last };
+            if order <= REPORTED {
+                self.requested.input_break(t + into)?;
+            }
+            if is_limited || stretch.side != 0 {
+                self.requested.limited(t + into, last);
+            }
+            let Some(pieces) = &mut self.pieces else {
+                continue;
+            };
             let mut piece = pieces.blank();
-            piece.start = delay + t;
-            piece.end = delay + next;
+            piece.start = delay + t + into;
+            piece.end = delay + last;
             piece.origin = t + delay;
             piece.scale = scale;
-            piece.series.copy_from(&v);
+            match (stretch.side, bounds) {
+                (1, Some((_, bound))) | (-1, Some((bound, _))) => piece.series.set_constant(bound),
+                _ => piece.series.copy_from(v),
+            }
             piece.order = order;
             pieces.push(piece)?;
         }
-        Ok(v.at(S::from(end)))
+        self.fields[self.place].1.end(S::from(end), &mut self.z);
+        if self.plant.rate().is_some()
+            && !is_instant
+            && let Some(place) = self.z.last_mut()
+        {
+            *place = v.at(S::from(end));
+        }
+        check_growth(&self.z, v.coefficients[0], next)
     }
 }
 

@@ -12,7 +12,8 @@ use crate::dde::limits::slack;
 use crate::dde::scalar::{Scalar, is_reached, part_ways};
 use crate::memory::push_back;
 
-use crate::dde::control_loop::series::Series;
+use crate::dde::control_loop::linear_loop::LinearLoop;
+use crate::dde::control_loop::series::{DEGREE, Series};
 
 /// Upper limit on the pieces in the queue (bounds memory and time).
 const MOST_PIECES: usize = 1_000_000;
@@ -203,5 +204,57 @@ impl<S: Scalar> Pieces<S> {
             });
         }
         push_back("the command in one delay", &mut self.queue, piece)
+    }
+}
+
+/// The orders of breaks behind the loop: an integration raises the order by one, a direct path
+/// keeps it.
+pub(super) struct Orders {
+    command_is_direct: bool,
+    output_is_direct: bool,
+    reference_in_command: Order,
+    reference_in_output: Order,
+}
+
+impl Orders {
+    pub(super) fn new<S: Scalar>(plant: &LinearLoop<S>) -> Self {
+        let equations = plant.equations();
+        let reaches_states = !equations.e.iter().all(|e| e.is_nothing());
+        Self {
+            command_is_direct: !equations.l.is_nothing(),
+            output_is_direct: !equations.d.is_nothing(),
+            reference_in_command: match (!equations.m.is_nothing(), reaches_states) {
+                (true, _) => 0,
+                (false, true) => 1,
+                (false, false) => SMOOTH,
+            },
+            reference_in_output: if reaches_states { 1 } else { SMOOTH },
+        }
+    }
+
+    /// Order of the break of the command where w breaks with order `arriving` and the reference may
+    /// jump.
+    pub(super) fn of_command(&self, arriving: Order, jumps: bool) -> Order {
+        let jump = jumps.then_some(self.reference_in_command);
+        Self::pass(arriving, self.command_is_direct).min(jump.unwrap_or(SMOOTH))
+    }
+
+    /// Order of the break of the output, likewise.
+    pub(super) fn of_output(&self, arriving: Order, jumps: bool) -> Order {
+        let jump = jumps.then_some(self.reference_in_output);
+        Self::pass(arriving, self.output_is_direct).min(jump.unwrap_or(SMOOTH))
+    }
+
+    fn pass(arriving: Order, direct: bool) -> Order {
+        let order = if direct {
+            arriving
+        } else {
+            arriving.saturating_add(1)
+        };
+        if usize::from(order) > DEGREE {
+            SMOOTH
+        } else {
+            order
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! The response, with or without a delay.
 
 use super::effort::{MOST_ELEMENTS, endless};
-use super::{aligned, delayed, modes};
+use super::{aligned, modes};
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start};
 use crate::dde::control_loop::reference::Reference;
 use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
@@ -29,10 +29,7 @@ pub(crate) fn run<S: Scalar>(
         if aligned::run(chosen, plant, start, reference, &mut requested, task)? {
             return Ok(requested.trajectory);
         }
-        requested.reserve()?;
-        delayed::run(plant, start, reference, requested, task)
-    } else {
-        requested.reserve()?;
-        modes::run(plant, start, reference, requested, task)
     }
+    requested.reserve()?;
+    modes::run(plant, start, reference, requested, task)
 }

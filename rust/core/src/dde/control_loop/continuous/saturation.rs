@@ -10,76 +10,56 @@
 
 use crate::dde::scalar::Scalar;
 
-use crate::dde::control_loop::level_crossings::{crossings, value_at};
+use crate::dde::control_loop::level_crossings::{in_order, value_at};
 use crate::dde::control_loop::linear_loop::Bounds;
 use crate::dde::control_loop::series::Series;
 
-/// Where the command is relative to its bounds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Mode {
-    /// Within.
-    Free,
-    /// Above the greatest command.
-    High,
-    /// Below the least one.
-    Low,
+/// Where the command is relative to a bound: −1 below the least, 1 above the greatest, 0 within.
+pub(super) type Side = i8;
+
+/// The side of a command; 0 where there are no bounds.
+pub(super) fn side_of(u: f64, bounds: Option<Bounds>) -> Side {
+    bounds.map_or(0, |(low, high)| Side::from(u > high) - Side::from(u < low))
 }
 
-impl Mode {
-    pub(super) fn of(u: f64, (low, high): Bounds) -> Self {
-        if u > high {
-            Self::High
-        } else if u < low {
-            Self::Low
-        } else {
-            Self::Free
-        }
-    }
-}
-
-/// An interval of [0, 1] in one mode.
+/// An interval of [0, 1] on one side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stretch {
-    pub(super) mode: Mode,
+    pub(super) side: Side,
     pub(super) start: f64,
     pub(super) end: f64,
 }
 
-/// The intervals of `u` on [0, 1], in order; neighbours differ in mode.
+/// The intervals of `u` on [0, 1], in order; neighbours differ in their side.
 pub(super) fn stretches<S: Scalar>(u: &Series<S>, bounds: Bounds, out: &mut Vec<Stretch>) {
     out.clear();
-    let whole = |mode| Stretch {
-        mode,
+    let whole = |side| Stretch {
+        side,
         start: 0.0,
         end: 1.0,
     };
     let (low, high) = u.range();
     if high <= bounds.1 && low >= bounds.0 {
-        return out.push(whole(Mode::Free));
+        return out.push(whole(0));
     }
     if low > bounds.1 {
-        return out.push(whole(Mode::High));
+        return out.push(whole(1));
     }
     if high < bounds.0 {
-        return out.push(whole(Mode::Low));
+        return out.push(whole(-1));
     }
-    let mut zeros = Vec::new();
-    for bound in [bounds.1, bounds.0] {
-        if bound.is_finite() {
-            crossings(u, bound, &mut zeros);
-        }
-    }
-    zeros.sort_by(f64::total_cmp);
+    let finite = [bounds.1, bounds.0].into_iter().filter(|b| b.is_finite());
+    let mut zeros = in_order(u, finite, Vec::new());
     zeros.push(1.0);
     let mut start = 0.0;
     for end in zeros {
         if end <= start {
             continue;
         }
-        let mode = Mode::of(value_at(u, 0.5 * (start + end)), bounds);
+        let side = side_of(value_at(u, 0.5 * (start + end)), Some(bounds));
         match out.last_mut() {
-            Some(last) if last.mode == mode => last.end = end,
-            _ => out.push(Stretch { mode, start, end }),
+            Some(last) if last.side == side => last.end = end,
+            _ => out.push(Stretch { side, start, end }),
         }
         start = end;
     }
@@ -111,14 +91,10 @@ mod tests {
     #[test]
     fn a_line_through_both_limits_is_cut_at_both() {
         let modes = found(&Series::of(&[-4.0, 8.0]), 1.0);
-        let expected = [
-            (Mode::Low, 0.0, 0.375),
-            (Mode::Free, 0.375, 0.625),
-            (Mode::High, 0.625, 1.0),
-        ];
+        let expected = [(-1, 0.0, 0.375), (0, 0.375, 0.625), (1, 0.625, 1.0)];
         assert_eq!(modes.len(), 3);
-        for (stretch, (mode, start, end)) in modes.iter().zip(expected) {
-            assert_eq!(stretch.mode, mode);
+        for (stretch, (side, start, end)) in modes.iter().zip(expected) {
+            assert_eq!(stretch.side, side);
             assert!((stretch.start - start).abs() < 1e-16 && (stretch.end - end).abs() < 1e-16);
         }
     }
@@ -130,7 +106,7 @@ mod tests {
         assert!(
             modes
                 .iter()
-                .all(|stretch| stretch.mode == Mode::Free || stretch.end - stretch.start < 1e-7)
+                .all(|stretch| stretch.side == 0 || stretch.end - stretch.start < 1e-7)
         );
     }
 
@@ -149,7 +125,7 @@ mod tests {
     fn standing_on_the_limit_is_free() {
         assert_eq!(found(&Series::of(&[1.0]), 1.0).len(), 1);
         assert_eq!(found(&Series::of(&[1.0, 1e-17, -1e-17]), 1.0).len(), 1);
-        assert_eq!(found(&Series::of(&[1.0, -0.5]), 1.0)[0].mode, Mode::Free);
+        assert_eq!(found(&Series::of(&[1.0, -0.5]), 1.0)[0].side, 0);
     }
 
     proptest! {
@@ -185,12 +161,12 @@ mod tests {
             let modes = found(&u, 1.0);
             prop_assert_eq!(modes[0].start, 0.0);
             prop_assert_eq!(modes[modes.len() - 1].end, 1.0);
-            prop_assert!(modes.windows(2).all(|p| p[0].end == p[1].start && p[0].mode != p[1].mode));
+            prop_assert!(modes.windows(2).all(|p| p[0].end == p[1].start && p[0].side != p[1].side));
             for sigma in sigmas {
                 let value = u.at(sigma);
                 prop_assume!((value.abs() - 1.0).abs() > 1e-9);
-                let here = modes.iter().find(|m| sigma <= m.end).map(|m| m.mode);
-                prop_assert_eq!(here, Some(Mode::of(value, (-1.0, 1.0))));
+                let here = modes.iter().find(|m| sigma <= m.end).map(|m| m.side);
+                prop_assert_eq!(here, Some(side_of(value, Some((-1.0, 1.0)))));
             }
         }
     }

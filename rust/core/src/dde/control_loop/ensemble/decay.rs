@@ -10,7 +10,7 @@
 //! alone. Each step divides errors by 1 − k²; where their product leaves too few digits, the answer
 //! is left to the eigenvalues.
 
-use crate::simd::{Mask, Outlined, Real, Simd};
+use crate::simd::{Mask, Real, Simd};
 
 use super::loops::{Controllers, Runs};
 use super::transition::{Matrix, product, row};
@@ -29,19 +29,10 @@ pub(super) struct Decay<S: Simd> {
     pub(super) no: Mask<S>,
 }
 
-/// Are all poles within `radius` of zero?
-pub(super) struct Within<'a, S: Simd, const N: usize> {
-    pub(super) runs: &'a Runs<S>,
-    pub(super) controllers: &'a Controllers<S, N>,
-    pub(super) radius: Real<S>,
-}
-
-impl<S: Simd, const N: usize> Outlined for Within<'_, S, N> {
-    type Output = Decay<S>;
-
+impl<S: Simd, const N: usize> Controllers<S, N> {
+    /// Are all poles within `radius` of zero?
     #[inline(always)]
-    fn run(self) -> Decay<S> {
-        let (runs, radius) = (self.runs, self.radius);
+    pub(super) fn decay(&self, runs: &Runs<S>, radius: Real<S>) -> Decay<S> {
         let (zero, no_lane) = (runs.zero, runs.no_lane);
         let degree = N + runs.samples + 1;
         if degree > MOST_DEGREE {
@@ -51,7 +42,7 @@ impl<S: Simd, const N: usize> Outlined for Within<'_, S, N> {
             };
         }
         let mut terms = [zero; MOST_DEGREE + 1];
-        self.characteristic(&mut terms, runs.samples + 1);
+        self.characteristic(zero, &mut terms, runs.samples + 1);
         let mut power = radius;
         for term in terms.iter_mut().take(degree + 1).skip(1) {
             *term = *term * power;
@@ -75,14 +66,11 @@ impl<S: Simd, const N: usize> Outlined for Within<'_, S, N> {
             no,
         }
     }
-}
 
-impl<S: Simd, const N: usize> Within<'_, S, N> {
     /// The coefficients of the characteristic polynomial, ascending.
     #[inline(always)]
-    fn characteristic(&self, terms: &mut [Real<S>], shift: usize) {
-        let Controllers { k, l, step: map } = self.controllers;
-        let zero = self.runs.zero;
+    fn characteristic(&self, zero: Real<S>, terms: &mut [Real<S>], shift: usize) {
+        let Self { k, l, step: map } = self;
         let mut phi: Matrix<S, N> = map.growth;
         for (i, row) in phi.iter_mut().enumerate() {
             row[i] = row[i] + 1.0;
@@ -94,7 +82,7 @@ impl<S: Simd, const N: usize> Within<'_, S, N> {
             for (i, row) in adjugate.iter_mut().enumerate() {
                 row[i] = row[i] + coefficient;
             }
-            self.add(terms, N + 1 - j, coefficient, shift, *l);
+            add(terms, N + 1 - j, coefficient, shift, *l);
             let (mut before, mut after) = (zero, zero);
             for i in 0..N {
                 before = k[i].mul_add(row(&adjugate[i], &map.before, zero), before);
@@ -109,20 +97,19 @@ impl<S: Simd, const N: usize> Within<'_, S, N> {
             }
             coefficient = trace * (-1.0 / j as f64);
         }
-        self.add(terms, 0, coefficient, shift, *l);
+        add(terms, 0, coefficient, shift, *l);
     }
+}
 
-    /// Add a term of a(z) (z^`shift` − L).
-    #[inline(always)]
-    fn add(
-        &self,
-        terms: &mut [Real<S>],
-        power: usize,
-        coefficient: Real<S>,
-        shift: usize,
-        l: Real<S>,
-    ) {
-        terms[power + shift] = terms[power + shift] + coefficient;
-        terms[power] = l.negated_mul_add(coefficient, terms[power]);
-    }
+/// Add a term of a(z) (z^`shift` − L).
+#[inline(always)]
+fn add<S: Simd>(
+    terms: &mut [Real<S>],
+    power: usize,
+    coefficient: Real<S>,
+    shift: usize,
+    l: Real<S>,
+) {
+    terms[power + shift] = terms[power + shift] + coefficient;
+    terms[power] = l.negated_mul_add(coefficient, terms[power]);
 }

@@ -13,7 +13,7 @@
     reason = "indices as in the formulas; closures would not be compiled for the vectors"
 )]
 
-use crate::simd::{Mask, Outlined, Real, Simd, flat, outlined};
+use crate::simd::{Mask, Real, Simd, flat, outlined};
 
 use super::block::{Block, Number};
 use super::decay::Decay;
@@ -49,33 +49,10 @@ pub(super) struct Delayed<S: Simd, const N: usize> {
 
 impl<S: Simd, const N: usize> Delayed<S, N> {
     /// The loops of pair number `pair` of vectors, run for `span` seconds of their output.
-    pub(super) fn new(simd: S, block: &Block, pair: usize, span: f64) -> Self {
-        let made = Made {
-            simd,
-            block,
-            pair,
-            span,
-        };
-        outlined(simd, made)
-    }
-}
-
-/// See [`Delayed::new`].
-struct Made<'a, S, const N: usize> {
-    simd: S,
-    block: &'a Block,
-    pair: usize,
-    span: f64,
-}
-
-impl<S: Simd, const N: usize> Outlined for Made<'_, S, N> {
-    type Output = Delayed<S, N>;
-
     #[inline(always)]
-    fn run(self) -> Delayed<S, N> {
-        let (simd, block, pair) = (self.simd, self.block, self.pair);
+    pub(super) fn new(simd: S, block: &Block, pair: usize, span: f64) -> Self {
         let delay = block.number(simd, Number::Delay, pair);
-        let mut runs = Runs::new(simd, block, pair, (delay, self.span));
+        let mut runs = Runs::new(simd, block, pair, (delay, span));
         let parts = block.shape.late;
         let h = delay / f64::from(parts);
         for number in 0..parts {
@@ -86,9 +63,9 @@ impl<S: Simd, const N: usize> Outlined for Made<'_, S, N> {
                 is_jump: false,
             });
         }
-        let mut loops = Delayed {
+        let mut loops = Self {
             runs,
-            plants: Plants::new::<N>(simd, block, pair),
+            plants: Plants::new(simd, block, pair),
             k: block.column(simd, N * N + 2 * N, pair),
             l: block.number(simd, Number::L, pair),
             h,
@@ -294,7 +271,11 @@ impl<S: Simd, const N: usize> Run<S> for Steps<'_, S, N> {
     }
 
     fn advance(&mut self, trace: &mut Trace<S>) -> bool {
-        outlined(self.output.simd(), Advance { steps: self, trace })
+        outlined(
+            self.output.simd(),
+            #[inline(always)]
+            || self.go_on(trace),
+        )
     }
 
     /// Such a command is at its limit at first alone.
@@ -326,21 +307,6 @@ impl<S: Simd, const N: usize> Run<S> for Steps<'_, S, N> {
             yes: none,
             no: none,
         }
-    }
-}
-
-/// See [`Run::advance`].
-struct Advance<'a, 'b, S: Simd, const N: usize> {
-    steps: &'a mut Steps<'b, S, N>,
-    trace: &'a mut Trace<S>,
-}
-
-impl<S: Simd, const N: usize> Outlined for Advance<'_, '_, S, N> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run(self) -> bool {
-        self.steps.go_on(self.trace)
     }
 }
 

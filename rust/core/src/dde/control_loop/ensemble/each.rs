@@ -8,35 +8,7 @@ use crate::dde::control_loop::step_metrics::StepMetrics;
 use crate::memory::collected;
 use crate::{Error, Task, parallel};
 
-use super::sets::{Found, Measures, Outcome, Sets};
-
-/// Metrics of one set, with its steady state and the slowest time constant of plant and controller.
-pub(super) fn metrics(
-    sets: &Sets<'_>,
-    set: usize,
-    numbers: (f64, f64),
-    span: f64,
-    criteria: &Criteria,
-    task: &Task,
-) -> Result<(Found, Outcome), Error> {
-    let Some(one) = loop_of(sets, set)? else {
-        return Ok((Found::UNKNOWN, Outcome::Refused));
-    };
-    one.metrics(numbers, span, criteria, task)
-}
-
-/// Outputs of one set.
-pub(super) fn response(
-    sets: &Sets<'_>,
-    set: usize,
-    times: &[f64],
-    task: &Task,
-) -> Result<(Vec<f64>, Outcome), Error> {
-    match loop_of(sets, set)? {
-        Some(one) => one.response(times, task),
-        None => Ok((Vec::new(), Outcome::Refused)),
-    }
-}
+use super::sets::{Found, Measures, Outcome, Sets, UNKNOWN};
 
 /// A loop, the time by which its output is read ahead, and the step of its reference.
 #[derive(Debug, Clone)]
@@ -49,17 +21,17 @@ pub struct Alone {
     pub amplitude: f64,
 }
 
-/// None where the numbers are not those of a loop.
-fn loop_of(sets: &Sets<'_>, set: usize) -> Result<Option<Alone>, Error> {
-    let found = sets.loop_of(set)?;
-    Ok(found.map(|plant| Alone {
-        ahead: sets.ahead(plant.delay()),
-        plant,
-        amplitude: sets.amplitude,
-    }))
-}
-
 impl Alone {
+    /// The loop of a set; none where its numbers are not those of one.
+    pub(super) fn of(sets: &Sets<'_>, set: usize) -> Result<Option<Self>, Error> {
+        let found = sets.loop_of(set)?;
+        Ok(found.map(|plant| Self {
+            ahead: sets.ahead(plant.delay()),
+            plant,
+            amplitude: sets.amplitude,
+        }))
+    }
+
     /// Metrics of a response of `span` seconds, with steady state and slowest time constant.
     pub(super) fn metrics(
         &self,
@@ -67,14 +39,14 @@ impl Alone {
         span: f64,
         criteria: &Criteria,
         task: &Task,
-    ) -> Result<(Found, Outcome), Error> {
+    ) -> Result<Found, Error> {
         let ahead = self.ahead;
         let end = [ahead + span];
         let mut steady = steady;
         if steady.is_nan() {
             match self.run(RequestedOutput::new(&end, &[], 0.0)?, task)? {
                 Ok(found) => steady = found.outputs.last().copied().unwrap_or(f64::NAN),
-                Err(outcome) => return Ok((Found::UNKNOWN, outcome)),
+                Err(outcome) => return Ok((UNKNOWN, outcome)),
             }
         }
         let pace = Pace {
@@ -87,13 +59,10 @@ impl Alone {
         Ok(match self.run(requested, task)? {
             Ok(_) => {
                 let record = metrics.record();
-                let found = Found {
-                    metrics: metrics.metrics(),
-                    limited_until: record.limited_until,
-                };
+                let found = (metrics.metrics(), record.limited_until);
                 (found, record.verdict(&pace).into())
             }
-            Err(outcome) => (Found::UNKNOWN, outcome),
+            Err(outcome) => (UNKNOWN, outcome),
         })
     }
 
@@ -152,10 +121,7 @@ pub fn metrics_alone(
     };
     let found = parallel::results("the sweep", numbers.len(), || (), work)?;
     for (set, found) in found.into_iter().enumerate() {
-        let (found, outcome) = found.unwrap_or((Found::UNKNOWN, Outcome::Refused));
-        let mut measures = Measures::new();
-        measures.push(&found, Some(outcome));
-        keep(&[set], &measures);
+        keep(&[set], &Measures::of_one(found));
     }
     Ok(())
 }

@@ -1,9 +1,8 @@
 //! Extrema of the outputs: at corners, inside of parts, and after the rise.
 
-use crate::simd::{Mask, Real, Simd, outlined};
+use crate::simd::{Mask, Real, Simd};
 
-use super::search::Search;
-use super::window::{EndsAt, Exceeds, Hit, Least, Strays};
+use super::search::{Hit, Search};
 
 impl<S: Simd> Search<'_, S> {
     /// Extremes at corners, and the end of unrest.
@@ -23,7 +22,12 @@ impl<S: Simd> Search<'_, S> {
                 continue;
             }
             let range = self.chunks(chunk, chunk);
-            let hit = self.seek::<_, false>(wanted, range, EndsAt(value));
+            let hit = self.seek::<false>(
+                wanted,
+                range,
+                #[inline(always)]
+                |_, [_, last, _]| last.eq(value),
+            );
             let time = hit.here.select(self.view.times(hit.part + 1.0), nan);
             let extreme = if is_top {
                 &mut self.measured.top
@@ -36,12 +40,8 @@ impl<S: Simd> Search<'_, S> {
         let chunk = self.spots.restless;
         let wanted = counts & chunk.ge(0.0);
         if wanted.any() {
-            let test = Strays {
-                steady: self.measured.steady,
-                band: self.measured.quiet_band,
-            };
             let range = (zero, self.chunks(chunk, chunk).1);
-            let hit = self.seek::<_, true>(wanted, range, test);
+            let hit = self.seek_strayed(wanted, range, self.measured.quiet_band);
             let time = self.view.times(hit.part + 1.0);
             self.measured.unsettled_until = hit.here.select(time, self.measured.unsettled_until);
         }
@@ -52,7 +52,6 @@ impl<S: Simd> Search<'_, S> {
     pub(super) fn extremes(&mut self) {
         let counts = self.measured.counts;
         let one = self.view.loops.zero.constant(1.0);
-        let most_change = self.most_change();
         for is_top in [true, false] {
             let (first, last) = if is_top {
                 self.spots.may_top
@@ -68,15 +67,7 @@ impl<S: Simd> Search<'_, S> {
                     (-one, -self.measured.bottom.0)
                 };
                 let bar = most + self.spots.tolerance;
-                let hit = self.seek::<_, false>(
-                    wanted,
-                    (begin, end),
-                    Exceeds {
-                        sign,
-                        bar,
-                        most_change,
-                    },
-                );
+                let hit = self.seek_beyond(wanted, (begin, end), (sign, bar));
                 wanted = hit.here;
                 if !wanted.any() {
                     break;
@@ -116,15 +107,16 @@ impl<S: Simd> Search<'_, S> {
         let end = self.chunks(chunk, chunk).1;
         // The chunks after the one in which the level may be reached first are known together.
         let is_there = hit.part.lt(end);
-        let least = Least {
-            trace: self.view.trace,
-            window: self.window,
-            wanted: done,
-            begin: hit.part,
-            end: is_there.select(end, parts),
-            sign: self.measured.sign,
-        };
-        let least = outlined(value.simd(), least).smaller(value);
+        let (mut least, sign) = (value, self.measured.sign);
+        self.seek::<false>(
+            done,
+            (hit.part, is_there.select(end, parts)),
+            #[inline(always)]
+            |inside, [_, last, _]| {
+                least = inside.select(least.smaller(last * sign), least);
+                done & !done
+            },
+        );
         let dip = is_there.select(least.smaller(self.spots.dip), least);
         self.measured.dip = done.select(dip, self.measured.dip);
         self.spots.dip_from = done.select(hit.part + 1.0, self.spots.dip_from);
@@ -141,12 +133,7 @@ impl<S: Simd> Search<'_, S> {
             let bar = self.measured.dip - self.spots.tolerance;
             let (from, to) = self.next_dip(begin, bar);
             let (from, to) = (from.larger(begin), to.smaller(parts));
-            let test = Exceeds {
-                sign: -sign,
-                bar: -bar,
-                most_change: self.most_change(),
-            };
-            let hit = self.seek::<_, false>(wanted, (from, to), test);
+            let hit = self.seek_beyond(wanted, (from, to), (-sign, -bar));
             begin = hit.here.select(hit.part + 1.0, to);
             wanted = wanted & begin.lt(parts);
             if !hit.here.any() {

@@ -1,12 +1,10 @@
 //! When the outputs reach the levels of the rise, and when they enter their band for the last time.
 
-use crate::dde::control_loop::level_crossings::crossings;
-use crate::dde::control_loop::series::Series;
-use crate::simd::{Mask, Real, Simd};
+use crate::dde::control_loop::level_crossings::last_entry;
+use crate::simd::Simd;
 
-use super::search::{Passing, Search};
+use super::search::Search;
 use super::trace::of;
-use super::window::{Reaches, Strays};
 
 impl<S: Simd> Search<'_, S> {
     /// When a level of the rise is reached.
@@ -21,8 +19,12 @@ impl<S: Simd> Search<'_, S> {
         let mut wanted = self.measured.counts & !risen.eq(risen) & chunk.ge(0.0);
         let mut begin = self.chunks(chunk, chunk).0;
         while wanted.any() {
-            let test = Reaches { sign, level };
-            let hit = self.seek::<_, false>(wanted, (begin, self.spots.parts), test);
+            let hit = self.seek::<false>(
+                wanted,
+                (begin, self.spots.parts),
+                #[inline(always)]
+                |_, [first, last, bulge]| ((first * sign).max(last * sign) + bulge).ge(level),
+            );
             wanted = hit.here;
             if !wanted.any() {
                 break;
@@ -45,7 +47,13 @@ impl<S: Simd> Search<'_, S> {
                 let until = self.until(hit.part);
                 let crosses = crosses & curved;
                 let shown = self.shown(hit.part, curved, (crosses, level * sign));
-                let reaches = self.passes(&shown, curved & !crosses, until, &Reached(sign, level));
+                let reaches = self.passes(
+                    &shown,
+                    curved & !crosses,
+                    until,
+                    #[inline(always)]
+                    |output| (output * sign).ge(level),
+                );
                 let sigma = self.crossing(&shown, crosses | reaches, until, level * sign);
                 done = done | crosses | reaches;
                 time = curved.select(self.time_in(hit.part, sigma), time);
@@ -82,8 +90,7 @@ impl<S: Simd> Search<'_, S> {
         self.measured.inside_since = outside.select(nan, self.measured.inside_since);
         wanted = wanted & !outside;
         while wanted.any() {
-            let test = Strays { steady, band };
-            let hit = self.seek::<_, true>(wanted, (zero, end), test);
+            let hit = self.seek_strayed(wanted, (zero, end), band);
             wanted = hit.here;
             if !wanted.any() {
                 break;
@@ -99,8 +106,13 @@ impl<S: Simd> Search<'_, S> {
                 let until = self.until(hit.part);
                 let enters = enters & curved;
                 let shown = self.shown(hit.part, curved, (enters, edge));
-                let beyond = Beyond(steady, band);
-                let leaves = self.passes(&shown, curved & !enters, until, &beyond);
+                let leaves = self.passes(
+                    &shown,
+                    curved & !enters,
+                    until,
+                    #[inline(always)]
+                    |output| (output - steady).abs().gt(band),
+                );
                 let mut sigma = shown.crossing;
                 done = done | enters | leaves;
                 let unknown = (enters | leaves) & !sigma.eq(sigma);
@@ -108,7 +120,7 @@ impl<S: Simd> Search<'_, S> {
                     for lane in unknown.lanes() {
                         let until = of(&until, lane);
                         let bounds = (of(&(steady - band), lane), of(&(steady + band), lane));
-                        let last = last_entry(&self.series(lane), bounds, until);
+                        let last = last_entry(&self.series(lane), bounds, (0.0, until));
                         sigma.numbers_mut()[lane] = last.unwrap_or(until);
                     }
                 }
@@ -118,33 +130,4 @@ impl<S: Simd> Search<'_, S> {
             wanted = wanted & !done;
         }
     }
-}
-
-/// Do they, multiplied by a sign, reach a level?
-struct Reached<S: Simd>(Real<S>, Real<S>);
-
-impl<S: Simd> Passing<S> for Reached<S> {
-    #[inline(always)]
-    fn holds(&self, output: Real<S>) -> Mask<S> {
-        (output * self.0).ge(self.1)
-    }
-}
-
-/// Are they farther than a band from a steady state?
-struct Beyond<S: Simd>(Real<S>, Real<S>);
-
-impl<S: Simd> Passing<S> for Beyond<S> {
-    #[inline(always)]
-    fn holds(&self, output: Real<S>) -> Mask<S> {
-        (output - self.0).abs().gt(self.1)
-    }
-}
-
-/// Where the polynomial last enters the band between two levels before `until`.
-fn last_entry(y: &Series, (low, high): (f64, f64), until: f64) -> Option<f64> {
-    let mut zeros = Vec::new();
-    crossings(y, low, &mut zeros);
-    crossings(y, high, &mut zeros);
-    let before = zeros.into_iter().filter(|&sigma| sigma <= until);
-    before.reduce(f64::max)
 }

@@ -1,11 +1,9 @@
 //! The loops of a block in SIMD lanes: their equations, and the parts of their samples.
-//!
-//! `N` is the number of states, of which the first `P` are those of the plant.
 
-use crate::simd::{Mask, Outlined, Real, Simd, outlined};
+use crate::simd::{Mask, Real, Simd, outlined};
 
 use super::block::{Block, Number};
-use super::transition::{Map, Matrix, Over, row, scaled};
+use super::transition::{Held, Map, Matrix, row, scaled};
 
 /// A part of a sample, on which the command that reaches the plant is constant.
 #[derive(Clone, Copy)]
@@ -21,8 +19,8 @@ pub(super) struct Part<S: Simd> {
 
 /// y = coefficients · x + …, at the end of a part.
 #[derive(Clone, Copy)]
-pub(super) struct Corner<S: Simd, const P: usize> {
-    pub(super) states: [Real<S>; P],
+pub(super) struct Corner<S: Simd, const N: usize> {
+    pub(super) states: [Real<S>; N],
     pub(super) before: Real<S>,
     pub(super) after: Real<S>,
     pub(super) constant: Real<S>,
@@ -33,9 +31,9 @@ pub(super) struct Corner<S: Simd, const P: usize> {
 }
 
 /// Loops in lanes.
-pub(super) struct Loops<S: Simd, const N: usize, const P: usize> {
+pub(super) struct Loops<S: Simd, const N: usize> {
     pub(super) runs: Runs<S>,
-    pub(super) plants: Plants<S, P>,
+    pub(super) plants: Plants<S, N>,
     pub(super) controllers: Controllers<S, N>,
 }
 
@@ -79,42 +77,32 @@ pub(super) struct Runs<S: Simd> {
     pub(super) first_output: Real<S>,
     pub(super) zero: Real<S>,
     pub(super) no_lane: Mask<S>,
-    /// Is D not zero?
-    pub(super) is_direct: bool,
     /// The number, within a sample, of the part that is the jump of the output; of no part if D = 0.
     pub(super) jump: usize,
-    /// Does the reference reach the plant other than through the command?
-    pub(super) is_pushed: bool,
 }
 
-/// The plants.
-pub(super) struct Plants<S: Simd, const P: usize> {
+/// Plants with their controllers. Outputs depend on the states of the plants alone.
+pub(super) struct Plants<S: Simd, const N: usize> {
     /// A, B, E r, C.
-    pub(super) a: Matrix<S, P>,
-    pub(super) b: [Real<S>; P],
-    pub(super) e: [Real<S>; P],
-    pub(super) c: [Real<S>; P],
-    /// Is the output the first state, D left out?
-    pub(super) is_first: bool,
+    pub(super) a: Matrix<S, N>,
+    pub(super) b: [Real<S>; N],
+    pub(super) e: [Real<S>; N],
+    pub(super) c: [Real<S>; N],
     /// From the sample to the start of each part; none of continuous loops.
-    pub(super) starts: Vec<Map<S, P>>,
+    pub(super) starts: Vec<Map<S, N>>,
     /// All corners of a sample but the last one.
-    pub(super) corners: Vec<Corner<S, P>>,
+    pub(super) corners: Vec<Corner<S, N>>,
     /// The output exceeds its values at both ends of a part by at most bulge · |x′| at the sample,
     /// plus `bulge_of_jump` times the change of the command that reaches the plant.
-    pub(super) bulge: [Real<S>; P],
+    pub(super) bulge: [Real<S>; N],
     pub(super) bulge_of_jump: Real<S>,
 }
 
-impl<S: Simd, const N: usize, const P: usize> Loops<S, N, P> {
+impl<S: Simd, const N: usize> Loops<S, N> {
     /// The loops of pair number `pair` of vectors, run for `span` seconds of their output.
     #[inline(always)]
     pub(super) fn new(simd: S, block: &Block, pair: usize, span: f64) -> Self {
         let zero = Real::splat(simd, 0.0);
-        let full = block.matrix(simd, pair);
-        let drive = block.column(simd, N * N, pair);
-        let push = block.column(simd, N * N + N, pair);
-        let push = scaled(&push, zero.constant(block.amplitude));
         let sample_time = block.number(simd, Number::SampleTime, pair);
         let delay = block.number(simd, Number::Delay, pair);
         let shape = block.shape;
@@ -127,7 +115,7 @@ impl<S: Simd, const N: usize, const P: usize> Loops<S, N, P> {
             (sample_time - early, early)
         };
         let mut runs = Runs::new(simd, block, pair, (sample_time, span));
-        let mut plants = Plants::new::<N>(simd, block, pair);
+        let mut plants = Plants::new(simd, block, pair);
         let mut step = Map::nothing(zero);
         let mut offset = zero;
         for (parts, length, is_after) in [(shape.early, early, false), (shape.late, late, true)] {
@@ -139,23 +127,21 @@ impl<S: Simd, const N: usize, const P: usize> Loops<S, N, P> {
             };
             if is_after && shape.jumps {
                 runs.parts.push(part);
-                plants.starts.push(step.leading(zero));
+                plants.starts.push(step);
             }
             if parts == 0 {
                 continue;
             }
             (part.length, part.is_jump) = (length / f64::from(parts), false);
-            let over = Over {
-                a: &full,
-                drive: &drive,
-                push: &push,
-                h: part.length,
-            };
-            let held = over.held();
+            let held = outlined(
+                simd,
+                #[inline(always)]
+                || Held::over(&plants.a, (&plants.b, &plants.e), part.length),
+            );
             for _ in 0..parts {
                 part.offset = offset;
                 runs.parts.push(part);
-                plants.starts.push(step.leading(zero));
+                plants.starts.push(step);
                 step = step.then(&held, !is_after);
                 offset = offset + part.length;
             }
@@ -168,13 +154,10 @@ impl<S: Simd, const N: usize, const P: usize> Loops<S, N, P> {
             plants.corners.push(corner);
         }
         if runs.is_curved {
-            let plants = &mut plants;
             outlined(
                 simd,
-                Bulges {
-                    plants,
-                    runs: &runs,
-                },
+                #[inline(always)]
+                || plants.bound(&runs),
             );
         }
         Self {
@@ -189,22 +172,15 @@ impl<S: Simd, const N: usize, const P: usize> Loops<S, N, P> {
     }
 }
 
-/// A function with |y″| ≤ M stays within M h²/8 of its chord, and y″ = c A e^{A t} x′.
-struct Bulges<'a, S: Simd, const P: usize> {
-    plants: &'a mut Plants<S, P>,
-    runs: &'a Runs<S>,
-}
-
-impl<S: Simd, const P: usize> Outlined for Bulges<'_, S, P> {
-    type Output = ();
-
+impl<S: Simd, const N: usize> Plants<S, N> {
+    /// Bound the bulges: a function with |y″| ≤ M stays within M h²/8 of its chord, and y″ =
+    /// c A e^{A t} x′.
     #[inline(always)]
-    fn run(self) {
-        let Self { plants, runs } = self;
+    fn bound(&mut self, runs: &Runs<S>) {
         let zero = runs.zero;
-        let slope = along(&plants.c, &plants.a);
-        let (mut most, mut longest) = ([zero; P], zero);
-        for (part, start) in runs.parts.iter().zip(&plants.starts) {
+        let slope = along(&self.c, &self.a);
+        let (mut most, mut longest) = ([zero; N], zero);
+        for (part, start) in runs.parts.iter().zip(&self.starts) {
             if part.is_jump {
                 continue;
             }
@@ -217,7 +193,7 @@ impl<S: Simd, const P: usize> Outlined for Bulges<'_, S, P> {
             let mut sum = absolute(&term);
             for j in 1..=runs.degree {
                 let factor = part.length * (1.0 / j as f64);
-                term = scaled(&along(&term, &plants.a), factor);
+                term = scaled(&along(&term, &self.a), factor);
                 for (sum, term) in sum.iter_mut().zip(&term) {
                     *sum = *sum + term.abs();
                 }
@@ -227,8 +203,8 @@ impl<S: Simd, const P: usize> Outlined for Bulges<'_, S, P> {
             }
         }
         let share = longest * longest * 0.125;
-        plants.bulge = scaled(&most, share);
-        plants.bulge_of_jump = row(&plants.bulge, &absolute(&plants.b), zero);
+        self.bulge = scaled(&most, share);
+        self.bulge_of_jump = row(&self.bulge, &absolute(&self.b), zero);
     }
 }
 
@@ -268,13 +244,11 @@ impl<S: Simd> Runs<S> {
             first_output: zero,
             zero,
             no_lane: zero.lt(0.0),
-            is_direct: shape.jumps,
             jump: if shape.jumps {
                 usize::from(shape.early)
             } else {
                 usize::MAX
             },
-            is_pushed: shape.is_pushed,
         }
     }
 
@@ -307,44 +281,33 @@ impl<S: Simd> Runs<S> {
     }
 }
 
-impl<S: Simd, const P: usize> Plants<S, P> {
-    /// The plants of loops with `N` states, without the parts of their samples.
+impl<S: Simd, const N: usize> Plants<S, N> {
+    /// The plants of loops, without the parts of their samples.
     #[inline(always)]
-    pub(super) fn new<const N: usize>(simd: S, block: &Block, pair: usize) -> Self {
+    pub(super) fn new(simd: S, block: &Block, pair: usize) -> Self {
         let zero = Real::splat(simd, 0.0);
-        let push = block.column::<S, N>(simd, N * N + N, pair);
+        let push = block.column(simd, N * N + N, pair);
         let corners = block.shape.corners();
         Self {
-            a: leading(&block.matrix::<S, N>(simd, pair), zero),
-            b: first(&block.column::<S, N>(simd, N * N, pair), zero),
-            e: first(&scaled(&push, zero.constant(block.amplitude)), zero),
-            c: first(&block.column::<S, N>(simd, N * N + 3 * N, pair), zero),
-            is_first: block.shape.is_first,
+            a: block.matrix(simd, pair),
+            b: block.column(simd, N * N, pair),
+            e: scaled(&push, zero.constant(block.amplitude)),
+            c: block.column(simd, N * N + 3 * N, pair),
             starts: Vec::with_capacity(corners),
             corners: Vec::with_capacity(corners),
-            bulge: [zero; P],
+            bulge: [zero; N],
             bulge_of_jump: zero,
-        }
-    }
-
-    /// C x.
-    #[inline(always)]
-    pub(super) fn seen(&self, x: &[Real<S>; P]) -> Real<S> {
-        if self.is_first {
-            x[0]
-        } else {
-            row(&self.c, x, x[0].constant(0.0))
         }
     }
 
     /// The output at the end of a part other than the last one.
     #[inline(always)]
-    fn corner(&self, runs: &Runs<S>, place: usize) -> Corner<S, P> {
+    fn corner(&self, runs: &Runs<S>, place: usize) -> Corner<S, N> {
         let (part, next) = (&runs.parts[place], &runs.parts[place + 1]);
         let (map, zero) = (&self.starts[place + 1], runs.zero);
         let mut states = self.c;
         for (j, state) in states.iter_mut().enumerate() {
-            for i in 0..P {
+            for i in 0..N {
                 *state = self.c[i].mul_add(map.growth[i][j], *state);
             }
         }
@@ -368,7 +331,7 @@ impl<S: Simd, const P: usize> Plants<S, P> {
 }
 
 #[inline(always)]
-fn absolute<S: Simd, const P: usize>(column: &[Real<S>; P]) -> [Real<S>; P] {
+fn absolute<S: Simd, const N: usize>(column: &[Real<S>; N]) -> [Real<S>; N] {
     let mut out = *column;
     for entry in &mut out {
         *entry = entry.abs();
@@ -378,40 +341,14 @@ fn absolute<S: Simd, const P: usize>(column: &[Real<S>; P]) -> [Real<S>; P] {
 
 /// row · A.
 #[inline(always)]
-fn along<S: Simd, const P: usize>(row: &[Real<S>; P], a: &Matrix<S, P>) -> [Real<S>; P] {
+fn along<S: Simd, const N: usize>(row: &[Real<S>; N], a: &Matrix<S, N>) -> [Real<S>; N] {
     let mut out = *row;
     for (j, out) in out.iter_mut().enumerate() {
         let mut sum = row[0] * a[0][j];
-        for i in 1..P {
+        for i in 1..N {
             sum = row[i].mul_add(a[i][j], sum);
         }
         *out = sum;
-    }
-    out
-}
-
-#[inline(always)]
-fn leading<S: Simd, const N: usize, const P: usize>(
-    a: &Matrix<S, N>,
-    zero: Real<S>,
-) -> Matrix<S, P> {
-    let mut out = [[zero; P]; P];
-    for (row, from) in out.iter_mut().zip(a) {
-        for (entry, from) in row.iter_mut().zip(from) {
-            *entry = *from;
-        }
-    }
-    out
-}
-
-#[inline(always)]
-fn first<S: Simd, const N: usize, const P: usize>(
-    column: &[Real<S>; N],
-    zero: Real<S>,
-) -> [Real<S>; P] {
-    let mut out = [zero; P];
-    for (entry, from) in out.iter_mut().zip(column) {
-        *entry = *from;
     }
     out
 }

@@ -6,7 +6,7 @@ use crate::simd::Simd;
 use super::loops::Runs;
 use super::measured::Measured;
 use super::rounds::measure;
-use super::sets::{Found, Measures, Outcome, SETS, of as number};
+use super::sets::{Measures, Outcome, SETS, UNKNOWN, of as number};
 use super::through::Job;
 use super::trace::{Trace, of};
 use super::view::View;
@@ -25,8 +25,9 @@ pub(super) struct MetricsJob<'a> {
 impl Job for MetricsJob<'_> {
     type Found = Measures;
 
-    fn done(found: &Measures) -> usize {
-        found.outcomes.iter().flatten().count()
+    fn done(found: &Measures) -> impl Iterator<Item = bool> {
+        let outcomes = found.outcomes.iter().take(found.count);
+        outcomes.map(Option::is_some)
     }
 
     #[inline(always)]
@@ -74,16 +75,16 @@ impl Job for MetricsJob<'_> {
         let lost = run.lost().select(1.0, zero);
         let unfit = run.unfit().select(1.0, zero);
         let limited = run.limited_until();
-        let mut measures = Measures::new();
+        let mut measures = Measures::NONE;
         let mut radius = zero;
         let mut is_doubtful = false;
         for (lane, (&set, levels)) in members.iter().zip(&levels).enumerate() {
             if of(&unfit, lane) > 0.0 {
-                measures.push(&Found::UNKNOWN, None);
+                measures.push(UNKNOWN, None);
                 continue;
             }
             if of(&lost, lane) > 0.0 {
-                measures.push(&Found::UNKNOWN, Some(Outcome::Diverged));
+                measures.push(UNKNOWN, Some(Outcome::Diverged));
                 continue;
             }
             let ahead = of(&loops.ahead, lane);
@@ -106,11 +107,8 @@ impl Job for MetricsJob<'_> {
                 let sample_time = of(&loops.sample_time, lane);
                 radius.numbers_mut()[lane] = libm::exp(-TIME_CONSTANTS * sample_time / inside);
             }
-            let found = Found {
-                metrics: record.metrics(levels),
-                limited_until: record.limited_until,
-            };
-            measures.push(&found, Some(outcome));
+            let found = (record.metrics(levels), record.limited_until);
+            measures.push(found, Some(outcome));
         }
         if is_doubtful {
             let decay = run.decay(radius);

@@ -36,7 +36,6 @@ mod trace;
 mod transition;
 mod view;
 mod walk;
-mod window;
 
 #[cfg(test)]
 mod tests;

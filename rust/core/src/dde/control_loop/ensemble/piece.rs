@@ -6,9 +6,8 @@
 //! partial sums s_j. Where neither y′ nor y″ is shown to keep its sign in this way, the polynomial
 //! is examined by sign changes in the Bernstein basis instead.
 
-use crate::dde::control_loop::level_crossings::crossings;
 use crate::dde::control_loop::series::{DEGREE, Series};
-use crate::simd::{Mask, Outlined, Real, Simd};
+use crate::simd::{Mask, Real, Simd};
 
 use super::trace::of;
 
@@ -100,7 +99,7 @@ impl<S: Simd> Piece<S> {
     /// Extrema in (0, 1), and crossings of a level where there are none. `sought` is filled with
     /// the polynomials whose zeros these are.
     #[inline(always)]
-    fn shown(&self, sought: &mut Self, asked: &Asked<S>) -> Shown<S> {
+    pub(super) fn shown(&self, sought: &mut Self, asked: &Asked<S>) -> Shown<S> {
         let zero = self.terms[0].constant(0.0);
         let (mut sum, mut least, mut most) = (zero, zero, zero);
         let (mut bend, mut lowest, mut highest) = (zero, zero, zero);
@@ -191,28 +190,4 @@ impl<S: Simd> Piece<S> {
         }
         series
     }
-}
-
-/// See [`Piece::shown`].
-pub(super) struct Solve<'a, S: Simd> {
-    pub(super) piece: &'a Piece<S>,
-    pub(super) sought: &'a mut Piece<S>,
-    pub(super) asked: Asked<S>,
-}
-
-impl<S: Simd> Outlined for Solve<'_, S> {
-    type Output = Shown<S>;
-
-    #[inline(always)]
-    fn run(self) -> Self::Output {
-        self.piece.shown(self.sought, &self.asked)
-    }
-}
-
-/// Zeros of the derivative in (0, 1), in order.
-pub(super) fn turns(y: &Series) -> Vec<f64> {
-    let mut zeros = Vec::new();
-    crossings(&y.derivative(), 0.0, &mut zeros);
-    zeros.sort_by(f64::total_cmp);
-    zeros
 }

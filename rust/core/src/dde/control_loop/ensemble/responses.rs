@@ -18,8 +18,8 @@ pub(super) struct ResponsesJob<'a> {
 impl Job for ResponsesJob<'_> {
     type Found = Vec<Option<(Vec<f64>, Outcome)>>;
 
-    fn done(found: &Self::Found) -> usize {
-        found.iter().flatten().count()
+    fn done(found: &Self::Found) -> impl Iterator<Item = bool> {
+        found.iter().map(Option::is_some)
     }
 
     #[inline(always)]

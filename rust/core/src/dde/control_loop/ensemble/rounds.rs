@@ -4,47 +4,47 @@
 //! (`spots`). What it is, and when, is then found in stages: a corner, an extremum inside a part, or a
 //! crossing of a level. Polynomials are needed for the last two alone.
 
-use crate::simd::{Outlined, Simd, outlined};
+use crate::simd::{Simd, outlined};
 
 use super::measured::Measured;
 use super::search::Search;
-use super::spots::spots;
+use super::spots::Spots;
 use super::view::View;
-use super::window::Window;
 
 /// Measure a trace.
 pub(super) fn measure<S: Simd>(view: &View<'_, S>, measured: &mut Measured<S>) {
     let zero = view.loops.zero;
-    let mut spots = spots(view, measured);
+    let mut spots = outlined(
+        zero.simd(),
+        #[inline(always)]
+        || Spots::new(view.trace, measured),
+    );
     measured.counts = measured.counts & spots.parts.gt(0.0);
     let mut search = Search {
         view,
         spots: &mut spots,
-        window: &mut Window::new(zero),
         pieces: &mut None,
         measured,
     };
-    outlined(zero.simd(), Whole(&mut search));
+    outlined(
+        zero.simd(),
+        #[inline(always)]
+        || search.whole(),
+    );
 }
 
-/// See [`measure`].
-struct Whole<'a, 'b, S: Simd>(&'a mut Search<'b, S>);
-
-impl<S: Simd> Outlined for Whole<'_, '_, S> {
-    type Output = ();
-
+impl<S: Simd> Search<'_, S> {
     #[inline(always)]
-    fn run(self) {
-        let search = self.0;
-        search.corners();
-        if search.view.loops.is_curved {
-            search.extremes();
+    fn whole(&mut self) {
+        self.corners();
+        if self.view.loops.is_curved {
+            self.extremes();
         }
-        search.rise(false);
-        search.rise(true);
-        if search.view.loops.is_curved {
-            search.dips();
+        self.rise(false);
+        self.rise(true);
+        if self.view.loops.is_curved {
+            self.dips();
         }
-        search.entry();
+        self.entry();
     }
 }

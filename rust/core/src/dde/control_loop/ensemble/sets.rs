@@ -25,21 +25,11 @@ pub enum Outcome {
     Doubtful = 4,
 }
 
-/// What is found of one set besides its outcome.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Found {
-    pub(super) metrics: Metrics,
-    /// The last time at which the command was at its limit; zero where it never was.
-    pub(super) limited_until: f64,
-}
+/// What is found of a set: metrics, the last time at which the command was at its limit, and the outcome.
+pub(super) type Found = ((Metrics, f64), Outcome);
 
-impl Found {
-    /// Nothing.
-    pub(super) const UNKNOWN: Self = Self {
-        metrics: Metrics::UNKNOWN,
-        limited_until: f64::NAN,
-    };
-}
+/// What is found of a set without a response.
+pub(super) const UNKNOWN: (Metrics, f64) = (Metrics::UNKNOWN, f64::NAN);
 
 impl From<Verdict> for Outcome {
     fn from(verdict: Verdict) -> Self {
@@ -66,24 +56,27 @@ pub struct Measures {
 
 impl Measures {
     /// Of no set yet.
-    pub(super) fn new() -> Self {
-        Self {
-            metrics: [[f64::NAN; SETS]; 9],
-            limited_until: [f64::NAN; SETS],
-            outcomes: [None; SETS],
-            count: 0,
-        }
+    pub(super) const NONE: Self = Self {
+        metrics: [[f64::NAN; SETS]; 9],
+        limited_until: [f64::NAN; SETS],
+        outcomes: [None; SETS],
+        count: 0,
+    };
+
+    /// Of one set, refused where nothing is found.
+    pub(super) fn of_one(found: Option<Found>) -> Self {
+        let (found, outcome) = found.unwrap_or((UNKNOWN, Outcome::Refused));
+        let mut out = Self::NONE;
+        out.push(found, Some(outcome));
+        out
     }
 
-    /// Append those of a set, without an outcome if it has to run alone.
+    /// Append metrics and the last time at the limit of a set, without an outcome if it has to run alone.
     #[inline]
-    pub(super) fn push(&mut self, found: &Found, outcome: Option<Outcome>) {
-        let Found {
-            metrics,
-            limited_until,
-        } = found;
+    pub(super) fn push(&mut self, found: (Metrics, f64), outcome: Option<Outcome>) {
+        let (metrics, limited_until) = found;
         if let Some(place) = self.limited_until.get_mut(self.count) {
-            *place = *limited_until;
+            *place = limited_until;
         }
         for (column, metric) in self.metrics.iter_mut().zip(metrics.to_array()) {
             if let Some(place) = column.get_mut(self.count) {

@@ -7,12 +7,12 @@
 use std::collections::BTreeMap;
 
 use crate::Error;
-use crate::dde::control_loop::row::{Row, width};
+use crate::dde::control_loop::row::Row;
 use crate::dde::control_loop::sampled::Timing;
 use crate::memory::push;
 
 use super::piece::{LONG, degree_for};
-use super::sets::{Sets, of};
+use super::sets::Sets;
 use super::trace::{SAMPLES, delays};
 use super::transition;
 
@@ -61,10 +61,6 @@ pub(super) struct Shape {
     pub(super) is_curved: bool,
     /// Degree of the polynomials of a part.
     pub(super) degree: u8,
-    /// Is the output the first state, but for D?
-    pub(super) is_first: bool,
-    /// Does the reference reach the plant other than through the command?
-    pub(super) is_pushed: bool,
 }
 
 impl Shape {
@@ -86,7 +82,7 @@ impl Shape {
 
 /// The first states of all loops, on which the output depends: those of the plant. The others do not
 /// reach them except through the command.
-pub(super) fn plant_states(sets: &Sets<'_>) -> usize {
+fn plant_states(sets: &Sets<'_>) -> usize {
     let n = sets.states();
     let entries = sets.entries();
     let is_nothing = |place: usize| entries.get(place).is_some_and(|entry| entry == &[0.0]);
@@ -96,149 +92,88 @@ pub(super) fn plant_states(sets: &Sets<'_>) -> usize {
         .unwrap_or(n)
 }
 
-/// The shapes of the loops of a sweep.
-pub(super) struct Shapes<'a> {
-    sets: &'a Sets<'a>,
-    plant: usize,
-    /// Entries with one number for each loop, by their places in a row.
-    varying: Vec<(usize, &'a [f64])>,
-    /// The row of the last loop.
-    row: Vec<f64>,
-    /// Are the numbers that are the same for all finite, but for the limit?
-    is_finite: bool,
-    /// What follows from A, C and E, where these are the same for all.
-    shared: Option<Plant>,
-}
-
 /// What follows from A, C and E.
 #[derive(Debug, Clone, Copy)]
 struct Plant {
     is_curved: bool,
-    is_first: bool,
-    is_pushed: bool,
     /// Bound on the rates of the plant, 1/s.
     rate: f64,
     /// ‖A‖₁, 1/s.
     norm: f64,
 }
 
-impl<'a> Shapes<'a> {
-    pub(super) fn new(sets: &'a Sets<'a>) -> Result<Self, Error> {
-        let plant = plant_states(sets);
-        let places = sets.entries().iter().enumerate();
-        let varying: Vec<_> = places
-            .filter(|(_, entry)| entry.len() != 1)
-            .map(|(place, entry)| (place, *entry))
-            .collect();
-        let n = sets.states();
-        let row = sets.row(0);
-        let shared = sets.entries().iter().take(width(n) - 1);
-        let mut shapes = Self {
-            sets,
-            plant,
-            varying,
-            row,
-            is_finite: shared
-                .filter(|entry| entry.len() == 1)
-                .all(|entry| entry.iter().all(|number| number.is_finite())),
-            shared: None,
-        };
-        let is_plant = |place: usize| {
-            place < n * n || (n * n + n..n * n + 2 * n).contains(&place) || {
-                (n * n + 3 * n..n * n + 4 * n).contains(&place)
-            }
-        };
-        if !shapes.varying.iter().any(|&(place, _)| is_plant(place)) {
-            shapes.shared = Some(plant_of(&Row::new(n, &shapes.row)?, plant));
-        }
-        Ok(shapes)
+/// The shape of a loop in a block for `span` seconds of output, of which `plant` states are those of the
+/// plant; none if it runs alone.
+fn shape_of(sets: &Sets<'_>, set: usize, plant: usize, span: f64) -> Option<Shape> {
+    let numbers = sets.row(set);
+    let row = Row::new(sets.states(), &numbers).ok()?;
+    let Row {
+        delay,
+        sample_time,
+        limit,
+        ..
+    } = row;
+    let (_, others) = numbers.split_last()?;
+    let fits = others.iter().all(|number| number.is_finite())
+        && (1..=MOST_STATES).contains(&sets.states())
+        && limit > 0.0;
+    if !fits {
+        return None;
     }
+    if sample_time == 0.0 {
+        return continuous(&row, span);
+    }
+    if !(delay >= 0.0 && sample_time > 0.0 && span + delay < MOST_SAMPLES * sample_time) {
+        return None;
+    }
+    let plant = plant_of(&row, plant);
+    let timing = Timing::new(delay, sample_time);
+    if plant.norm * sample_time > transition::MOST {
+        return None;
+    }
+    let parts = |length: f64| (plant.rate * length).ceil();
+    let (mut early, mut late) = (f64::from(timing.early > 0.0), 1.0);
+    if plant.is_curved {
+        early = parts(timing.early).max(early);
+        late = parts(timing.late).max(late);
+    }
+    if early.max(late) > MOST_PARTS {
+        return None;
+    }
+    Some(Shape {
+        is_continuous: false,
+        samples: u32::try_from(timing.samples).ok()?,
+        early: early as u8,
+        late: late as u8,
+        jumps: row.d != 0.0,
+        is_curved: plant.is_curved,
+        // The same for all delays, so that more loops share a block.
+        degree: degree_for((plant.rate * sample_time).min(1.0)) as u8,
+    })
+}
 
-    /// The shape of a loop in a block for `span` seconds of output; none if it runs alone.
-    fn of(&mut self, set: usize, span: f64) -> Option<Shape> {
-        let n = self.sets.states();
-        let mut fits = self.is_finite && (1..=MOST_STATES).contains(&n);
-        for &(place, entry) in &self.varying {
-            let value = of(entry, set);
-            if let Some(number) = self.row.get_mut(place) {
-                *number = value;
-            }
-            fits &= value.is_finite() || place + 1 == width(n);
-        }
-        let &[.., d, _, delay, sample_time, limit] = &*self.row else {
-            return None;
-        };
-        fits &= limit > 0.0;
-        if !fits {
-            return None;
-        }
-        if sample_time == 0.0 {
-            return continuous(&Row::new(n, &self.row).ok()?, span);
-        }
-        if !(delay >= 0.0 && sample_time > 0.0 && span + delay < MOST_SAMPLES * sample_time) {
-            return None;
-        }
-        let plant = match self.shared {
-            Some(plant) => plant,
-            None => plant_of(&Row::new(n, &self.row).ok()?, self.plant),
-        };
-        let timing = Timing::new(delay, sample_time);
-        if plant.norm * sample_time > transition::MOST {
-            return None;
-        }
-        let (early, late) = if plant.is_curved {
-            let parts = |length: f64| (plant.rate * length).ceil();
-            let early = parts(timing.early).max(f64::from(timing.early > 0.0));
-            (early, parts(timing.late).max(1.0))
-        } else {
-            (f64::from(timing.early > 0.0), 1.0)
-        };
-        if early.max(late) > MOST_PARTS {
-            return None;
-        }
-        Some(Shape {
-            is_continuous: false,
-            samples: u32::try_from(timing.samples).ok()?,
-            early: early as u8,
-            late: late as u8,
-            jumps: d != 0.0,
-            is_curved: plant.is_curved,
-            // The same for all delays, so that more loops share a block.
-            degree: degree_for((plant.rate * sample_time).min(1.0)) as u8,
-            is_first: plant.is_first,
-            is_pushed: plant.is_pushed,
-        })
-    }
+/// Sets of one shape, and that shape.
+pub(super) type Alike = (Shape, Vec<usize>);
 
-    /// The sets that run in blocks, by their shapes, and those that run alone.
-    #[expect(clippy::type_complexity, reason = "two lists")]
-    pub(super) fn sorted(
-        mut self,
-        span: f64,
-    ) -> Result<(Vec<(Shape, Vec<usize>)>, Vec<usize>), Error> {
-        let mut alike: Vec<(Shape, Vec<usize>)> = Vec::new();
-        let mut places = BTreeMap::new();
-        let mut latest = None;
-        let mut alone = Vec::new();
-        for set in 0..self.sets.len() {
-            let Some(shape) = self.of(set, span) else {
-                push(SWEEP, &mut alone, set)?;
-                continue;
-            };
-            let place = match latest {
-                Some((same, place)) if same == shape => place,
-                _ => *places.entry(shape).or_insert(alike.len()),
-            };
-            latest = Some((shape, place));
-            if place == alike.len() {
-                push(SWEEP, &mut alike, (shape, Vec::new()))?;
-            }
-            if let Some((_, sets)) = alike.get_mut(place) {
-                push(SWEEP, sets, set)?;
-            }
+/// The sets that run in blocks, by their shapes, and those that run alone.
+pub(super) fn sorted(sets: &Sets<'_>, span: f64) -> Result<(Vec<Alike>, Vec<usize>), Error> {
+    let plant = plant_states(sets);
+    let (mut alike, mut alone) = (Vec::<Alike>::new(), Vec::new());
+    let mut places = BTreeMap::new();
+    for set in 0..sets.len() {
+        let Some(shape) = shape_of(sets, set, plant, span) else {
+            push(SWEEP, &mut alone, set)?;
+            continue;
+        };
+        let place = *places.entry(shape).or_insert(alike.len());
+        if place == alike.len() {
+            push(SWEEP, &mut alike, (shape, Vec::new()))?;
         }
-        Ok((alike, alone))
+        if let Some((_, sets)) = alike.get_mut(place) {
+            push(SWEEP, sets, set)?;
+        }
     }
+    Ok((alike, alone))
 }
 
 /// The shape of a continuous loop: its delay is cut into parts on which all signals are short Taylor
@@ -262,8 +197,6 @@ fn continuous(row: &Row<'_>, span: f64) -> Option<Shape> {
         jumps: false,
         is_curved: true,
         degree: degree as u8,
-        is_first: false,
-        is_pushed: false,
     })
 }
 
@@ -306,12 +239,6 @@ fn plant_of(row: &Row<'_>, p: usize) -> Plant {
     let norm = |j: usize| (0..n).map(|i| a(i, j).abs()).sum::<f64>();
     Plant {
         is_curved: !is_line,
-        is_first: row
-            .c
-            .iter()
-            .enumerate()
-            .all(|(i, &c)| c == f64::from(u8::from(i == 0))),
-        is_pushed: row.e.iter().take(p).any(|&e| e != 0.0),
         rate: (0..p).map(square).fold(0.0, f64::max).sqrt(),
         norm: (0..n).map(norm).fold(0.0, f64::max),
     }

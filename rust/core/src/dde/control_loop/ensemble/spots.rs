@@ -1,10 +1,9 @@
 //! The chunks of a trace in which something that counts may happen, in all loops at once.
 
-use crate::simd::{Outlined, Real, Simd, outlined};
+use crate::simd::{Real, Simd};
 
 use super::measured::Measured;
 use super::trace::{CHUNK, Trace};
-use super::view::View;
 
 /// An extremum counts if it may exceed the one known by this share of the step: rounding errors of
 /// a settled output are below it.
@@ -40,26 +39,10 @@ pub(super) struct Spots<S: Simd> {
     pub(super) last: Real<S>,
 }
 
-pub(super) fn spots<S: Simd>(view: &View<'_, S>, measured: &Measured<S>) -> Spots<S> {
-    let look = Look {
-        trace: view.trace,
-        measured,
-    };
-    outlined(view.loops.zero.simd(), look)
-}
-
-/// See [`spots`].
-struct Look<'a, S: Simd> {
-    trace: &'a Trace<S>,
-    measured: &'a Measured<S>,
-}
-
-impl<S: Simd> Outlined for Look<'_, S> {
-    type Output = Spots<S>;
-
+impl<S: Simd> Spots<S> {
+    /// Those of a trace.
     #[inline(always)]
-    fn run(self) -> Spots<S> {
-        let Self { trace, measured } = self;
+    pub(super) fn new(trace: &Trace<S>, measured: &Measured<S>) -> Self {
         let Measured {
             sign,
             steady,
@@ -119,7 +102,7 @@ impl<S: Simd> Outlined for Look<'_, S> {
             }
         }
         let [may_top, may_bottom] = extremes;
-        Spots {
+        Self {
             parts,
             most,
             top,

@@ -1,11 +1,11 @@
 //! Metrics and responses of all sets.
 
 use super::block::{Column, Members};
-use super::each;
+use super::each::Alone;
 use super::metrics::MetricsJob;
 use super::responses::ResponsesJob;
-use super::sets::{Found, Measures, Outcome, SETS, Sets, of};
-use super::shape::{Shapes, plant_states};
+use super::sets::{Measures, Outcome, SETS, Sets, of};
+use super::shape::sorted;
 use super::through::{Job, through};
 use crate::dde::control_loop::metrics::Criteria;
 use crate::memory::{filled, push, reserved, room};
@@ -28,36 +28,18 @@ const BLOCKS: usize = 32;
 /// Upper limit on the values of responses held at a time (bounds memory to a share of the result).
 const VALUES_AT_ONCE: usize = 1 << 22;
 
-/// What receives the results of a sweep.
-trait Kept<J: Job> {
-    /// The result of a set that runs alone.
-    type Single: Send;
-
-    /// Keep the results of the first of `members`, and append to `left` those that have to run
-    /// alone. Returns how many they are.
-    fn lanes(
-        &mut self,
-        members: &[usize],
-        found: J::Found,
-        left: &mut Vec<usize>,
-    ) -> Result<usize, Error>;
-
-    fn single(&mut self, set: usize, found: Self::Single);
-}
-
 impl Sets<'_> {
     /// Process all sets, blocks with `job` and single sets with `alone`; at most `at_once` results
     /// are held before they are kept.
-    fn each<J: Job, K: Kept<J>>(
+    fn each<J: Job>(
         &self,
         (span, at_once): (f64, usize),
         task: &Task,
         job: &J,
-        alone: impl Fn(usize) -> Result<K::Single, Error> + Sync,
-        kept: &mut K,
+        alone: impl Fn(usize) -> Result<J::Found, Error> + Sync,
+        mut keep: impl FnMut(&[usize], &J::Found),
     ) -> Result<(), Error> {
-        let (alike, mut left) = Shapes::new(self)?.sorted(span)?;
-        let plant = plant_states(self);
+        let (alike, mut left) = sorted(self, span)?;
         let count = alike.iter().map(|(_, sets)| sets.len().div_ceil(SETS));
         let mut blocks: Vec<Members<'_>> = reserved(SWEEP, count.sum())?;
         for (shape, sets) in &alike {
@@ -74,8 +56,9 @@ impl Sets<'_> {
                 task.check()?;
                 let columns = blocks.iter().map(|(shape, _)| shape.columns()).max();
                 room::<Column>(SWEEP, columns.unwrap_or(0))?;
-                through(self, plant, blocks, (span, job), found);
-                task.advance(found.iter().map(|found| J::done(found) as u64).sum());
+                through(self, blocks, (span, job), found);
+                let done = found.iter().flat_map(J::done).filter(|is_done| *is_done);
+                task.advance(done.count() as u64);
                 Ok(())
             };
             let share = group.len().div_ceil(tasks).clamp(1, BLOCKS);
@@ -88,8 +71,16 @@ impl Sets<'_> {
                     let Some(found) = found.next() else {
                         break;
                     };
-                    let count = kept.lanes(members, found, &mut left)?;
-                    members = members.get(count..).unwrap_or_default();
+                    let mut count = 0;
+                    for (is_done, &set) in J::done(&found).zip(members) {
+                        count += 1;
+                        if !is_done {
+                            push(SWEEP, &mut left, set)?;
+                        }
+                    }
+                    let (own, others) = members.split_at(count);
+                    keep(own, &found);
+                    members = others;
                 }
             }
         }
@@ -102,78 +93,10 @@ impl Sets<'_> {
             };
             let found = parallel::results(SWEEP, group.len(), || (), work)?;
             for (set, found) in group.iter().zip(found.into_iter().flatten()) {
-                kept.single(*set, found);
+                keep(&[*set], &found);
             }
         }
         Ok(())
-    }
-}
-
-/// A function that receives metrics.
-struct Receiver<F>(F);
-
-impl<F: FnMut(&[usize], &Measures)> Kept<MetricsJob<'_>> for Receiver<F> {
-    type Single = (Found, Outcome);
-
-    fn lanes(
-        &mut self,
-        members: &[usize],
-        found: Measures,
-        left: &mut Vec<usize>,
-    ) -> Result<usize, Error> {
-        let count = found.count.min(members.len());
-        for (&set, outcome) in members.iter().zip(&found.outcomes).take(count) {
-            if outcome.is_none() {
-                push(SWEEP, left, set)?;
-            }
-        }
-        (self.0)(members.get(..count).unwrap_or_default(), &found);
-        Ok(count)
-    }
-
-    fn single(&mut self, set: usize, (found, outcome): Self::Single) {
-        let mut measures = Measures::new();
-        measures.push(&found, Some(outcome));
-        (self.0)(&[set], &measures);
-    }
-}
-
-/// Outputs of all sets, a row a set.
-struct Rows {
-    outputs: Vec<f64>,
-    outcomes: Vec<Outcome>,
-    length: usize,
-}
-
-impl Kept<ResponsesJob<'_>> for Rows {
-    type Single = (Vec<f64>, Outcome);
-
-    fn lanes(
-        &mut self,
-        members: &[usize],
-        found: Vec<Option<Self::Single>>,
-        left: &mut Vec<usize>,
-    ) -> Result<usize, Error> {
-        let count = found.len();
-        for (&set, found) in members.iter().zip(found) {
-            match found {
-                Some(found) => self.single(set, found),
-                None => push(SWEEP, left, set)?,
-            }
-        }
-        Ok(count)
-    }
-
-    fn single(&mut self, set: usize, (values, outcome): Self::Single) {
-        let places = set * self.length..(set + 1) * self.length;
-        if let Some(row) = self.outputs.get_mut(places)
-            && values.len() == self.length
-        {
-            row.copy_from_slice(&values);
-        }
-        if let Some(place) = self.outcomes.get_mut(set) {
-            *place = outcome;
-        }
     }
 }
 
@@ -203,9 +126,11 @@ pub fn metrics(
         &job,
         |set| {
             let numbers = (of(steady, set), of(slowest, set));
-            each::metrics(sets, set, numbers, span, criteria, task)
+            let one = Alone::of(sets, set)?;
+            let found = one.map(|one| one.metrics(numbers, span, criteria, task));
+            Ok(Measures::of_one(found.transpose()?))
         },
-        &mut Receiver(keep),
+        keep,
     )
 }
 
@@ -217,21 +142,27 @@ pub fn responses(
     task: &Task,
 ) -> Result<(Vec<f64>, Vec<Outcome>), Error> {
     let length = times.len();
-    let mut rows = Rows {
-        outputs: filled(SWEEP, f64::NAN, sets.len().saturating_mul(length))?,
-        outcomes: filled(SWEEP, Outcome::Refused, sets.len())?,
-        length,
-    };
-    let span = times.last().copied().unwrap_or(0.0);
+    let mut outputs = filled(SWEEP, f64::NAN, sets.len().saturating_mul(length))?;
+    let mut outcomes = filled(SWEEP, Outcome::Refused, sets.len())?;
+    let at_once = (VALUES_AT_ONCE / length.max(1)).clamp(1, AT_ONCE * rayon::current_num_threads());
     sets.each(
-        (
-            span,
-            (VALUES_AT_ONCE / length.max(1)).clamp(1, AT_ONCE * rayon::current_num_threads()),
-        ),
+        (times.last().copied().unwrap_or(0.0), at_once),
         task,
         &ResponsesJob { times },
-        |set| each::response(sets, set, times, task),
-        &mut rows,
+        |set| {
+            let one = Alone::of(sets, set)?;
+            Ok(vec![one.map(|one| one.response(times, task)).transpose()?])
+        },
+        |members, found| {
+            for (&set, found) in members.iter().zip(found) {
+                let places = set * length..(set + 1) * length;
+                if let (Some((values, outcome)), Some(place)) = (found, outcomes.get_mut(set)) {
+                    *place = *outcome;
+                    let row = outputs.get_mut(places).filter(|_| values.len() == length);
+                    row.into_iter().for_each(|row| row.copy_from_slice(values));
+                }
+            }
+        },
     )?;
-    Ok((rows.outputs, rows.outcomes))
+    Ok((outputs, outcomes))
 }

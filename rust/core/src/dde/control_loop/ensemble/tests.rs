@@ -120,9 +120,10 @@ fn all_metrics(
 
 /// Metrics of a set by the code for single loops.
 fn alone(sets: &Sets<'_>, set: usize, span: f64) -> Metrics {
-    let numbers = (f64::NAN, 0.0);
-    let found = each::metrics(sets, set, numbers, span, &CRITERIA, &Task::new());
-    found.map_or(Metrics::UNKNOWN, |(found, _)| found.metrics)
+    let one = each::Alone::of(sets, set).ok().flatten();
+    let found = one.map(|one| one.metrics((f64::NAN, 0.0), span, &CRITERIA, &Task::new()));
+    let found = found.and_then(Result::ok);
+    found.map_or(Metrics::UNKNOWN, |((metrics, _), _)| metrics)
 }
 
 /// Loops whose gains differ from those of `rows` by some rounding errors. A saturated loop may be
@@ -432,12 +433,12 @@ fn in_lanes(
     let entries: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
     let sets = Sets::new(1, numbers.len(), &entries, step, false)?;
     let span = times.last().copied().unwrap_or(0.0);
-    let (alike, _) = shape::Shapes::new(&sets)?.sorted(span)?;
+    let (alike, _) = shape::sorted(&sets, span)?;
     let mut found = vec![None; sets.len()];
     for (shape, members) in &alike {
         let (mut rows, blocks) = (Vec::new(), [(*shape, &members[..])]);
         let job = responses::ResponsesJob { times };
-        through::through(&sets, 1, &blocks, (span, &job), &mut rows);
+        through::through(&sets, &blocks, (span, &job), &mut rows);
         for (&set, row) in members.iter().zip(rows.into_iter().flatten()) {
             found[set] = row.map(|(outputs, _)| outputs);
         }

@@ -2,7 +2,7 @@
 
 use pulp::WithSimd;
 
-use crate::simd::{Instructions, Outlined, Real, Simd, outlined};
+use crate::simd::{Instructions, Real, Simd, outlined};
 
 use super::block::{Block, Members};
 use super::delayed::{Delayed, Steps};
@@ -16,8 +16,8 @@ pub(super) trait Job: Sync {
     /// The results of some sets.
     type Found: Send;
 
-    /// For how many sets there are results.
-    fn done(found: &Self::Found) -> usize;
+    /// For each set whether it has a result, or has to run alone.
+    fn done(found: &Self::Found) -> impl Iterator<Item = bool>;
 
     /// Append the results of the lanes of `members`.
     fn found<S: Simd>(
@@ -32,7 +32,6 @@ pub(super) trait Job: Sync {
 
 struct Through<'a, J: Job> {
     sets: &'a Sets<'a>,
-    plant: usize,
     blocks: &'a [Members<'a>],
     span: f64,
     job: &'a J,
@@ -40,17 +39,15 @@ struct Through<'a, J: Job> {
 }
 
 /// Do `job` with all members of `blocks` for `span` seconds of each output, and append the results
-/// in their order. The output depends on the first `plant` states alone.
+/// in their order.
 pub(super) fn through<J: Job>(
     sets: &Sets<'_>,
-    plant: usize,
     blocks: &[Members<'_>],
     (span, job): (f64, &J),
     found: &mut Vec<J::Found>,
 ) {
     Instructions::chosen().run_widest(Through {
         sets,
-        plant,
         blocks,
         span,
         job,
@@ -81,26 +78,11 @@ impl<J: Job> WithSimd for Through<'_, J> {
                     span: self.span,
                     job: self.job,
                 };
-                if block.shape.is_continuous {
-                    match self.sets.states() {
-                        1 => lanes.step::<1>(&mut trace, found),
-                        2 => lanes.step::<2>(&mut trace, found),
-                        3 => lanes.step::<3>(&mut trace, found),
-                        _ => lanes.step::<4>(&mut trace, found),
-                    }
-                    continue;
-                }
-                match (self.sets.states(), self.plant) {
-                    (1, _) => lanes.run::<1, 1>(&mut trace, found),
-                    (2, 1) => lanes.run::<2, 1>(&mut trace, found),
-                    (2, _) => lanes.run::<2, 2>(&mut trace, found),
-                    (3, 1) => lanes.run::<3, 1>(&mut trace, found),
-                    (3, 2) => lanes.run::<3, 2>(&mut trace, found),
-                    (3, _) => lanes.run::<3, 3>(&mut trace, found),
-                    (_, 1) => lanes.run::<4, 1>(&mut trace, found),
-                    (_, 2) => lanes.run::<4, 2>(&mut trace, found),
-                    (_, 3) => lanes.run::<4, 3>(&mut trace, found),
-                    _ => lanes.run::<4, 4>(&mut trace, found),
+                match self.sets.states() {
+                    1 => lanes.run::<1>(&mut trace, found),
+                    2 => lanes.run::<2>(&mut trace, found),
+                    3 => lanes.run::<3>(&mut trace, found),
+                    _ => lanes.run::<4>(&mut trace, found),
                 }
             }
         }
@@ -118,22 +100,22 @@ struct Pair<'a, S, J> {
 }
 
 impl<S: Simd, J: Job> Pair<'_, S, J> {
-    /// Sampled loops.
-    fn run<const N: usize, const P: usize>(&self, trace: &mut Trace<S>, found: &mut Vec<J::Found>) {
-        let made: Made<'_, S, N, P> = Made {
-            simd: self.simd,
-            block: self.block,
-            pair: self.pair,
-            span: self.span,
-        };
-        let loops = outlined(self.simd, made);
-        self.process(&loops.runs, &mut Walk::new(&loops), trace, found);
-    }
-
-    /// Continuous loops.
-    fn step<const N: usize>(&self, trace: &mut Trace<S>, found: &mut Vec<J::Found>) {
-        let loops: Delayed<S, N> = Delayed::new(self.simd, self.block, self.pair, self.span);
-        self.process(&loops.runs, &mut Steps::new(&loops), trace, found);
+    fn run<const N: usize>(&self, trace: &mut Trace<S>, found: &mut Vec<J::Found>) {
+        if self.block.shape.is_continuous {
+            let loops: Delayed<S, N> = outlined(
+                self.simd,
+                #[inline(always)]
+                || Delayed::new(self.simd, self.block, self.pair, self.span),
+            );
+            self.process(&loops.runs, &mut Steps::new(&loops), trace, found);
+        } else {
+            let loops: Loops<S, N> = outlined(
+                self.simd,
+                #[inline(always)]
+                || Loops::new(self.simd, self.block, self.pair, self.span),
+            );
+            self.process(&loops.runs, &mut Walk::new(&loops), trace, found);
+        }
     }
 
     fn process(
@@ -143,52 +125,10 @@ impl<S: Simd, J: Job> Pair<'_, S, J> {
         trace: &mut Trace<S>,
         found: &mut Vec<J::Found>,
     ) {
-        let job = Done {
-            job: self.job,
-            loops,
-            run,
-            members: self.members,
-            trace,
-            found,
-        };
-        outlined(self.simd, job);
-    }
-}
-
-/// See [`Loops::new`].
-struct Made<'a, S, const N: usize, const P: usize> {
-    simd: S,
-    block: &'a Block,
-    pair: usize,
-    span: f64,
-}
-
-impl<S: Simd, const N: usize, const P: usize> Outlined for Made<'_, S, N, P> {
-    type Output = Loops<S, N, P>;
-
-    #[inline(always)]
-    fn run(self) -> Loops<S, N, P> {
-        Loops::new(self.simd, self.block, self.pair, self.span)
-    }
-}
-
-/// See [`Job::found`].
-struct Done<'a, S: Simd, J: Job> {
-    job: &'a J,
-    loops: &'a Runs<S>,
-    run: &'a mut dyn Run<S>,
-    members: &'a [usize],
-    trace: &'a mut Trace<S>,
-    found: &'a mut Vec<J::Found>,
-}
-
-impl<S: Simd, J: Job> Outlined for Done<'_, S, J> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let (members, trace) = (self.members, self.trace);
-        self.job
-            .found(self.loops, self.run, members, trace, self.found);
+        outlined(
+            self.simd,
+            #[inline(always)]
+            || self.job.found(loops, run, self.members, trace, found),
+        );
     }
 }

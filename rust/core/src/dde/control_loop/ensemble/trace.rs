@@ -13,9 +13,6 @@ pub(super) const SAMPLES: usize = 256;
 /// enough for the cache of a core.
 const PARTS: usize = 128;
 
-/// Parts that are read at once: those of a chunk of samples with two parts.
-pub(super) const WINDOW: usize = 8;
-
 /// Delays in a trace of continuous loops, each of which has so many parts: whole chunks.
 pub(super) fn delays(parts: usize) -> usize {
     (PARTS / parts).next_multiple_of(CHUNK).max(CHUNK)
@@ -77,7 +74,7 @@ impl<S: Simd> Trace<S> {
             jump: usize::MAX,
             is_curved: false,
             is_continuous: false,
-            outputs: vec![zero.lanes(); WINDOW + 1],
+            outputs: vec![zero.lanes()],
             states: Vec::new(),
             bulges: Vec::new(),
             commands: Vec::new(),

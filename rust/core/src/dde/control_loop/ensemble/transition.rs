@@ -11,7 +11,7 @@
     reason = "indices as in the formulas; closures would not be compiled for the vectors"
 )]
 
-use crate::simd::{Outlined, Real, Simd, outlined};
+use crate::simd::{Real, Simd, outlined};
 
 /// Largest ‖A‖₁ h for which φ is summed without doubling.
 const REACH: f64 = 0.25;
@@ -70,26 +70,14 @@ pub(super) struct Held<S: Simd, const N: usize> {
     push: [Real<S>; N],
 }
 
-/// `h` seconds under constant w and r; `push` is E r.
-pub(super) struct Over<'a, S: Simd, const N: usize> {
-    pub(super) a: &'a Matrix<S, N>,
-    pub(super) drive: &'a [Real<S>; N],
-    pub(super) push: &'a [Real<S>; N],
-    pub(super) h: Real<S>,
-}
-
-impl<S: Simd, const N: usize> Over<'_, S, N> {
-    pub(super) fn held(self) -> Held<S, N> {
-        outlined(self.h.simd(), self)
-    }
-}
-
-impl<S: Simd, const N: usize> Outlined for Over<'_, S, N> {
-    type Output = Held<S, N>;
-
+impl<S: Simd, const N: usize> Held<S, N> {
+    /// `h` seconds under constant w and r; `push` is E r.
     #[inline(always)]
-    fn run(self) -> Held<S, N> {
-        let Self { a, drive, push, h } = self;
+    pub(super) fn over(
+        a: &Matrix<S, N>,
+        (drive, push): (&[Real<S>; N], &[Real<S>; N]),
+        h: Real<S>,
+    ) -> Self {
         let zero = h.constant(0.0);
         let mut norm = zero;
         for j in 0..N {
@@ -98,14 +86,6 @@ impl<S: Simd, const N: usize> Outlined for Over<'_, S, N> {
                 column = column + row[j].abs();
             }
             norm = norm.larger(column);
-        }
-        if !norm.gt(0.0).any() {
-            // The result of the series, at less cost.
-            return Held {
-                growth: [[zero; N]; N],
-                drive: scaled(drive, h),
-                push: scaled(push, h),
-            };
         }
         let (mut scale, mut doublings) = (h.constant(1.0), zero);
         loop {
@@ -118,7 +98,10 @@ impl<S: Simd, const N: usize> Outlined for Over<'_, S, N> {
         }
         let step = h * scale;
         let z = rescaled(a, step);
-        let mut phi = identity(h);
+        let mut phi = [[zero; N]; N];
+        for (i, row) in phi.iter_mut().enumerate() {
+            row[i] = h.constant(1.0);
+        }
         for j in (2..=TERMS).rev() {
             let part = 1.0 / f64::from(j);
             phi = rescaled(&product(&z, &phi), h.constant(part));
@@ -126,7 +109,7 @@ impl<S: Simd, const N: usize> Outlined for Over<'_, S, N> {
                 row[i] = row[i] + 1.0;
             }
         }
-        let mut held = Held {
+        let mut held = Self {
             growth: product(&z, &phi),
             drive: scaled(&times(&phi, drive), step),
             push: scaled(&times(&phi, push), step),
@@ -178,25 +161,31 @@ impl<S: Simd, const N: usize> Map<S, N> {
 
     /// This change, and that of a part under w₁ or w₀ after it.
     pub(super) fn then(&self, part: &Held<S, N>, is_before: bool) -> Self {
-        let then = Then {
-            map: self,
-            part,
-            is_before,
-        };
-        outlined(part.drive[0].simd(), then)
+        outlined(
+            part.drive[0].simd(),
+            #[inline(always)]
+            || self.continued(part, is_before),
+        )
     }
 
-    /// The first `P` states, which the others do not reach.
     #[inline(always)]
-    pub(super) fn leading<const P: usize>(&self, zero: Real<S>) -> Map<S, P> {
-        let mut out = Map::<S, P>::nothing(zero);
-        for i in 0..P.min(N) {
-            for j in 0..P.min(N) {
-                out.growth[i][j] = self.growth[i][j];
+    fn continued(&self, part: &Held<S, N>, is_before: bool) -> Self {
+        let mut out = *self;
+        let grown = product(&part.growth, &self.growth);
+        for i in 0..N {
+            for j in 0..N {
+                out.growth[i][j] = self.growth[i][j] + (part.growth[i][j] + grown[i][j]);
             }
-            out.before[i] = self.before[i];
-            out.after[i] = self.after[i];
-            out.push[i] = self.push[i];
+            let growth = &part.growth[i];
+            out.before[i] = row(growth, &self.before, self.before[i]);
+            out.after[i] = row(growth, &self.after, self.after[i]);
+            out.push[i] = row(growth, &self.push, self.push[i]) + part.push[i];
+            let reached = if is_before {
+                &mut out.before
+            } else {
+                &mut out.after
+            };
+            reached[i] = reached[i] + part.drive[i];
         }
         out
     }
@@ -211,49 +200,6 @@ impl<S: Simd, const N: usize> Map<S, N> {
         }
         out
     }
-}
-
-/// See [`Map::then`].
-struct Then<'a, S: Simd, const N: usize> {
-    map: &'a Map<S, N>,
-    part: &'a Held<S, N>,
-    is_before: bool,
-}
-
-impl<S: Simd, const N: usize> Outlined for Then<'_, S, N> {
-    type Output = Map<S, N>;
-
-    #[inline(always)]
-    fn run(self) -> Map<S, N> {
-        let (map, part) = (self.map, self.part);
-        let mut out = *map;
-        let grown = product(&part.growth, &map.growth);
-        for i in 0..N {
-            for j in 0..N {
-                out.growth[i][j] = map.growth[i][j] + (part.growth[i][j] + grown[i][j]);
-            }
-            let growth = &part.growth[i];
-            out.before[i] = row(growth, &map.before, map.before[i]);
-            out.after[i] = row(growth, &map.after, map.after[i]);
-            out.push[i] = row(growth, &map.push, map.push[i]) + part.push[i];
-            let reached = if self.is_before {
-                &mut out.before
-            } else {
-                &mut out.after
-            };
-            reached[i] = reached[i] + part.drive[i];
-        }
-        out
-    }
-}
-
-#[inline(always)]
-fn identity<S: Simd, const N: usize>(like: Real<S>) -> Matrix<S, N> {
-    let mut out = [[like.constant(0.0); N]; N];
-    for (i, row) in out.iter_mut().enumerate() {
-        row[i] = like.constant(1.0);
-    }
-    out
 }
 
 /// The product of two matrices.
@@ -275,12 +221,8 @@ pub(super) fn product<S: Simd, const N: usize>(a: &Matrix<S, N>, b: &Matrix<S, N
 #[inline(always)]
 fn times<S: Simd, const N: usize>(a: &Matrix<S, N>, x: &[Real<S>; N]) -> [Real<S>; N] {
     let mut out = *x;
-    for (i, out) in out.iter_mut().enumerate() {
-        let mut sum = a[i][0] * x[0];
-        for inner in 1..N {
-            sum = a[i][inner].mul_add(x[inner], sum);
-        }
-        *out = sum;
+    for (out, a) in out.iter_mut().zip(a) {
+        *out = row(a, x, x[0].constant(0.0));
     }
     out
 }

@@ -65,26 +65,14 @@ impl<S: Simd> View<'_, S> {
     #[inline]
     fn begin(&self, lane: usize, part: usize) -> f64 {
         let (sample, number) = self.trace.split(part);
-        let offset = self.loops.parts.get(number);
-        self.time(
-            lane,
-            (self.trace.first + sample) as f64,
-            offset.map_or(0.0, |part| of(&part.offset, lane)),
-        )
+        let sample = (self.trace.first + sample) as f64;
+        self.time(lane, sample, self.loops.parts[number].offset)
     }
 
     /// [`Runs::time`] of a lane.
     #[inline]
-    fn time(&self, lane: usize, sample: f64, offset: f64) -> f64 {
-        let sample_time = of(&self.loops.sample_time, lane);
-        let time = sample_time * sample;
-        match &self.loops.share {
-            Some(share) if sample == 1.0 => time + offset * of(share, lane),
-            Some(share) if sample > 1.0 => {
-                time - (sample_time - sample_time * of(share, lane)) + offset
-            }
-            _ => time + offset,
-        }
+    fn time(&self, lane: usize, sample: f64, offset: Real<S>) -> f64 {
+        of(&self.loops.time(offset.constant(sample), offset), lane)
     }
 
     /// σ at the ends of parts, inside of which the runs may end.
@@ -125,16 +113,17 @@ impl<S: Simd> View<'_, S> {
     /// The part of a time, and σ in it; none if it is not in the trace.
     pub(super) fn find(&self, lane: usize, time: f64) -> Option<(usize, f64)> {
         let sample_time = of(&self.loops.sample_time, lane);
+        let zero = self.loops.zero;
         // A time at which a part begins, but for rounding errors, is in that part.
         let reached = time + slack(time, sample_time);
         // What the second sample lacks of a whole one.
-        let lacks = 2.0 * sample_time - self.time(lane, 2.0, 0.0);
+        let lacks = 2.0 * sample_time - self.time(lane, 2.0, zero);
         let mut sample = ((reached + lacks) / sample_time).floor();
         // The quotient may be rounded to the next whole number, or down from it, and belongs to the
         // sample before if that is the first one.
-        if self.time(lane, sample, 0.0) > reached {
+        if self.time(lane, sample, zero) > reached {
             sample -= 1.0;
-        } else if self.time(lane, sample + 1.0, 0.0) <= reached {
+        } else if self.time(lane, sample + 1.0, zero) <= reached {
             sample += 1.0;
         }
         let sample = (sample as usize).checked_sub(self.trace.first)?;

@@ -6,10 +6,9 @@
 )]
 
 use crate::dde::limits::DIVERGED;
-use crate::simd::{Mask, Outlined, Real, Simd, outlined};
+use crate::simd::{Mask, Real, Simd, outlined};
 
-use super::decay::{Decay, Within};
-use super::expand::Expand;
+use super::decay::Decay;
 use super::loops::{Loops, Runs};
 use super::piece::Piece;
 use super::trace::{CHUNK, SAMPLES, Summary, Trace};
@@ -42,8 +41,8 @@ pub(super) trait Run<S: Simd> {
 }
 
 /// A run from rest.
-pub(super) struct Walk<'a, S: Simd, const N: usize, const P: usize> {
-    loops: &'a Loops<S, N, P>,
+pub(super) struct Walk<'a, S: Simd, const N: usize> {
+    loops: &'a Loops<S, N>,
     x: [Real<S>; N],
     output: Real<S>,
     /// The output at the last corner inside of the run.
@@ -54,9 +53,9 @@ pub(super) struct Walk<'a, S: Simd, const N: usize, const P: usize> {
     limited_until: Real<S>,
 }
 
-impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
+impl<'a, S: Simd, const N: usize> Walk<'a, S, N> {
     #[inline(always)]
-    pub(super) fn new(loops: &'a Loops<S, N, P>) -> Self {
+    pub(super) fn new(loops: &'a Loops<S, N>) -> Self {
         let runs = &loops.runs;
         Self {
             loops,
@@ -94,7 +93,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             zero.lanes(),
         );
         if loops.is_curved {
-            longer(&mut trace.states, SAMPLES * P, zero);
+            longer(&mut trace.states, SAMPLES * N, zero);
             longer(&mut trace.bulges, SAMPLES, zero.lanes());
         }
         trace.restart(self.number, self.output);
@@ -155,17 +154,17 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             if loops.is_curved {
                 let held = if is_late { after } else { before };
                 let mut bulge = (after - before).abs() * plants.bulge_of_jump;
-                for i in 0..P {
+                for i in 0..N {
                     let forced = plants.b[i].mul_add(held, plants.e[i]);
-                    let slope = row(&plants.a[i], &first(&x), forced);
+                    let slope = row(&plants.a[i], &x, forced);
                     bulge = slope.abs().mul_add(plants.bulge[i], bulge);
                 }
                 summary.bulge = summary.bulge.max(bulge);
                 if let Some(place) = trace.bulges.get_mut(sample) {
                     *place = bulge.lanes();
                 }
-                if let Some(places) = trace.states.get_mut(sample * P..(sample + 1) * P) {
-                    for i in 0..P {
+                if let Some(places) = trace.states.get_mut(sample * N..(sample + 1) * N) {
+                    for i in 0..N {
                         places[i] = x[i];
                     }
                 }
@@ -186,10 +185,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
                 if corner.is_after {
                     forced = corner.after.mul_add(after, forced);
                 }
-                if loops.is_pushed {
-                    forced = forced + corner.constant;
-                }
-                output = row(&corner.states, &first(&x), forced);
+                output = row(&corner.states, &x, forced + corner.constant);
                 if is_hidden && !(corner.is_after && number == loops.samples) {
                     output = loops.first_output;
                 }
@@ -217,8 +213,8 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             } else {
                 size = row(&x, &x, u.mul_add(u, size));
             }
-            output = plants.seen(&first(&x));
-            if loops.is_direct {
+            output = row(&plants.c, &x, loops.zero);
+            if loops.jump != usize::MAX {
                 output = loops.d.mul_add(after, output);
             }
             if is_hidden && number < loops.samples {
@@ -301,15 +297,18 @@ impl<S: Simd> Ends<S> {
     }
 }
 
-impl<S: Simd, const N: usize, const P: usize> Run<S> for Walk<'_, S, N, P> {
+impl<S: Simd, const N: usize> Run<S> for Walk<'_, S, N> {
     fn begin(&mut self, trace: &mut Trace<S>) {
         *self = Self::new(self.loops);
         begun(&self.loops.runs, trace);
     }
 
     fn advance(&mut self, trace: &mut Trace<S>) -> bool {
-        let simd = self.output.simd();
-        outlined(simd, Advance { walk: self, trace })
+        outlined(
+            self.output.simd(),
+            #[inline(always)]
+            || self.go_on(trace),
+        )
     }
 
     fn lost(&self) -> Mask<S> {
@@ -326,41 +325,22 @@ impl<S: Simd, const N: usize, const P: usize> Run<S> for Walk<'_, S, N, P> {
 
     fn piece(&self, trace: &Trace<S>, parts: Real<S>, piece: &mut Piece<S>) {
         let Loops { runs, plants, .. } = self.loops;
-        let expand = Expand {
-            runs,
-            plants,
-            trace,
-            parts,
-            piece,
-        };
-        outlined(parts.simd(), expand);
+        outlined(
+            parts.simd(),
+            #[inline(always)]
+            || plants.expand(runs, trace, parts, piece),
+        );
     }
 
     fn decay(&self, radius: Real<S>) -> Decay<S> {
         let Loops {
             runs, controllers, ..
         } = self.loops;
-        let within = Within {
-            runs,
-            controllers,
-            radius,
-        };
-        outlined(radius.simd(), within)
-    }
-}
-
-/// See [`Run::advance`].
-struct Advance<'a, 'b, S: Simd, const N: usize, const P: usize> {
-    walk: &'a mut Walk<'b, S, N, P>,
-    trace: &'a mut Trace<S>,
-}
-
-impl<S: Simd, const N: usize, const P: usize> Outlined for Advance<'_, '_, S, N, P> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run(self) -> bool {
-        self.walk.go_on(self.trace)
+        outlined(
+            radius.simd(),
+            #[inline(always)]
+            || controllers.decay(runs, radius),
+        )
     }
 }
 
@@ -369,14 +349,4 @@ pub(super) fn longer<T: Clone>(numbers: &mut Vec<T>, length: usize, zero: T) {
     if numbers.len() < length {
         numbers.resize(length, zero);
     }
-}
-
-/// The states of the plant.
-#[inline(always)]
-fn first<S: Simd, const N: usize, const P: usize>(x: &[Real<S>; N]) -> [Real<S>; P] {
-    let mut out = [x[0]; P];
-    for i in 0..P.min(N) {
-        out[i] = x[i];
-    }
-    out
 }

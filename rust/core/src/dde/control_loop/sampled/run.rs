@@ -13,7 +13,7 @@ use crate::memory::push;
 use crate::{Error, Task};
 
 use super::timing::Timing;
-use super::window::{INPUTS, Window, Windows};
+use super::window::{INPUTS, Window};
 
 /// Samples between two checks for cancellation.
 const CHECK_EVERY: u64 = 1024;
@@ -53,7 +53,7 @@ pub(crate) fn run<S: Scalar>(
     if phase > 0.0 {
         // The run begins inside the interval after sample −1.
         walk.held = S::from(walk.cursor.value());
-        walk.partial(-1, sample_time - S::from(phase), S::default())?;
+        walk.interval(-1, sample_time - S::from(phase), S::default())?;
     }
     let mut k = 0_u64;
     while !walk.requested.is_done() {
@@ -70,7 +70,7 @@ pub(crate) fn run<S: Scalar>(
         }
         let now = S::from(k as f64).mul_add(sample_time, S::from(phase));
         walk.sample(k as i64, now, sample_time)?;
-        walk.interval(k as i64, now)?;
+        walk.interval(k as i64, S::default(), now)?;
         k += 1;
     }
     Ok(walk.requested.trajectory)
@@ -79,19 +79,32 @@ pub(crate) fn run<S: Scalar>(
 /// How the states move over the parts of a sample.
 struct Field<'a, S: Scalar> {
     equations: Cow<'a, Equations<S>>,
-    early: Propagator<S>,
-    late: Propagator<S>,
-    /// The output as polynomials, once it is asked for between samples, or measured.
-    windows: OnceCell<Windows>,
+    early: Span<S>,
+    late: Span<S>,
 }
 
 impl<'a, S: Scalar> Field<'a, S> {
     fn new(equations: Cow<'a, Equations<S>>, timing: Timing<S>) -> Self {
         Self {
-            early: equations.over(timing.early),
-            late: equations.over(timing.late),
-            windows: OnceCell::new(),
+            early: Span::new(&equations, timing.early),
+            late: Span::new(&equations, timing.late),
             equations,
+        }
+    }
+}
+
+/// A part of a sample under constant inputs.
+struct Span<S: Scalar> {
+    over: Propagator<S>,
+    /// The output as polynomials, once it is asked for between samples, or measured.
+    window: OnceCell<Window<S>>,
+}
+
+impl<S: Scalar> Span<S> {
+    fn new(equations: &Equations<S>, length: S) -> Self {
+        Self {
+            over: equations.over(length),
+            window: OnceCell::new(),
         }
     }
 }
@@ -208,21 +221,36 @@ impl<S: Scalar> Walk<'_, '_, S> {
         self.requested.output_break(now)
     }
 
-    /// Advance from sample `k` at time `now` to the next one.
-    fn interval(&mut self, k: i64, now: S) -> Result<(), Error> {
+    /// Advance to the next sample from `into` seconds after sample `k`, at time `now`.
+    fn interval(&mut self, k: i64, into: S, now: S) -> Result<(), Error> {
         let Timing { early, late, .. } = self.timing;
         let tolerance = slack(now, early + late);
         let [u, before, after] = self.commands_of(k);
-        self.requested
-            .inputs_before((now + early + late).value() - tolerance, |_| u);
+        let is_whole = into.is_nothing();
+        let end = now + (early + late - into);
+        self.requested.inputs_before(end.value() - tolerance, u);
+        let mut at = now;
         // A length that is zero but has a slope counts as well.
-        if !early.is_nothing() {
-            self.go(before, now, early, Part::Early, tolerance)?;
+        let is_early =
+            (is_whole && !early.is_nothing()) || into.value() < early.value() - tolerance;
+        if is_early {
+            let (left, part) = if is_whole {
+                (early, Part::Early)
+            } else {
+                (early - into, Part::Other)
+            };
+            self.go(before, at, left, part, tolerance)?;
+            at = now + left;
         }
-        if before != after {
-            self.requested.output_break(now + early)?;
+        if before != after && (is_whole || is_early) {
+            self.requested.output_break(at)?;
         }
-        self.go(after, now + early, late, Part::Late, tolerance)
+        let (left, part) = if is_whole {
+            (late, Part::Late)
+        } else {
+            (end - at, Part::Other)
+        };
+        self.go(after, at, left, part, tolerance)
     }
 
     /// Change the states that change at samples.
@@ -236,23 +264,6 @@ impl<S: Scalar> Walk<'_, '_, S> {
             }
         }
         std::mem::swap(&mut self.x, &mut self.scratch);
-    }
-
-    /// Advance from `into` seconds after sample `k` (at time `now`) to the next sample.
-    fn partial(&mut self, k: i64, into: S, now: S) -> Result<(), Error> {
-        let Timing { early, late, .. } = self.timing;
-        let tolerance = slack(now, early + late);
-        let [u, before, after] = self.commands_of(k);
-        let end = now + (early + late - into);
-        self.requested.inputs_before(end.value() - tolerance, |_| u);
-        let mut at = now;
-        if into.value() < early.value() - tolerance {
-            let switch = now + (early - into);
-            self.go(before, at, switch - at, Part::Other, tolerance)?;
-            self.requested.output_break(switch)?;
-            at = switch;
-        }
-        self.go(after, at, end - at, Part::Other, tolerance)
     }
 
     /// Advance over `length` seconds under constant w, input by input that jumps within.
@@ -289,47 +300,25 @@ impl<S: Scalar> Walk<'_, '_, S> {
         let columns: &[S] = inputs.get(..equations.inputs()).unwrap_or_default();
         let until = (from + length).value() - tolerance;
         let (x, scratch) = (&self.x, &mut self.scratch);
-        // Most times of a record are those of samples, at which the output is known.
-        let known = if S::MOVES {
-            until
-        } else {
-            until.min(from.value().next_up())
-        };
-        self.requested.outputs_before(known, |t| {
-            let h = t - from;
-            let h = h.pinned(h.value().max(0.0));
-            if h.is_nothing() {
-                return equations.output(x, w);
-            }
-            equations.over(h).apply(x, columns, scratch);
-            equations.output(scratch, w)
-        });
-        if self.requested.is_measured() || (!S::MOVES && self.requested.next_output() < until) {
-            let windows = &field.windows;
-            let own = windows.get_or_init(|| Windows::new(equations, self.timing));
-            let other;
-            let window = match part {
-                Part::Early => &own.early,
-                Part::Late => &own.late,
-                Part::Other => {
-                    other = Window::new(own.equations(), length.value());
-                    &other
-                }
-            };
-            let times = (from.value(), until);
-            let values = inputs.map(S::value);
-            window.serve(own.equations(), &self.x, values, times, &mut self.requested);
-        }
         let other;
-        let over = match part {
+        let span = match part {
             Part::Early => &field.early,
             Part::Late => &field.late,
             Part::Other => {
-                other = equations.over(length);
+                other = Span::new(equations, length);
                 &other
             }
         };
-        over.apply(&self.x, columns, &mut self.scratch);
+        // Most times of a record are those of samples, at which the output is known.
+        let known = until.min(from.value().next_up());
+        if !S::MOVES && self.requested.next_output() < known {
+            self.requested.outputs_before(known, equations.output(x, w));
+        }
+        if self.requested.is_measured() || self.requested.next_output() < until {
+            let window = span.window.get_or_init(|| Window::new(equations, length));
+            window.serve(equations, x, inputs, (from, until), &mut self.requested);
+        }
+        span.over.apply(x, columns, scratch);
         std::mem::swap(&mut self.x, &mut self.scratch);
     }
 }

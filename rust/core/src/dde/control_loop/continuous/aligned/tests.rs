@@ -1,6 +1,6 @@
 //! The response in elements that are equal parts of the delay.
 
-use super::super::delayed;
+use super::super::modes;
 use super::*;
 use crate::dde::Equations;
 use proptest::prelude::*;
@@ -17,7 +17,7 @@ fn found(
     let task = Task::new();
     let mut requested = RequestedOutput::new(times[0], times[1], 0.0).unwrap();
     let Some(instructions) = instructions else {
-        return Some(delayed::run(plant, start, reference, requested, &task).unwrap());
+        return Some(modes::run(plant, start, reference, requested, &task).unwrap());
     };
     let is_stored = run(instructions, plant, start, reference, &mut requested, &task);
     is_stored.unwrap().then_some(requested.trajectory)
