@@ -63,7 +63,7 @@ def test_the_coefficient_is_that_of_the_rows_that_are_in_segments():
     found = correlation_of(grid, 0.6)
     lag = 8
     k = int(np.argmin(np.abs(found.lags - lag * grid.step)))
-    pairs = [(p.asked[: p.asked.size - lag], p.came[lag:]) for p in grid.pieces]
+    pairs = [(p.asked[: p.asked.size - lag], p.response[lag:]) for p in grid.pieces]
     wanted = np.corrcoef(*(np.concatenate(side) for side in zip(*pairs, strict=True)))[0, 1]
     assert found.coefficient[k] == pytest.approx(wanted, abs=1e-9)
     # Without a block: the first segment begins later.

@@ -5,7 +5,7 @@ import os
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime.logs.latencies._clocks import growth_of, rates_apart
+from deadtime.logs.latencies._clocks import growth_of, rate_of_drift
 from deadtime.logs.latencies._commands import period_of, sampling_of
 from deadtime.logs.latencies._latency import latency_of
 from deadtime.logs.latencies._relation import WindowTime
@@ -165,20 +165,20 @@ def test_stamps_tell_how_fast_their_clocks_are(gaps):
     received = np.round((1.0 + 7e-5) * (0.001 * np.arange(10_000) + 0.0003), 6)
     if gaps:
         sent, received = (one[random.uniform(size=one.size) < 0.7] for one in (sent, received))
-    found = rates_apart(sent, received)
+    found = rate_of_drift(sent, received)
     assert abs(found.value - 7e-5) < found.most < 1e-6
     # Stamps that scatter tell less, and say so.
-    found = rates_apart(sent, received + random.uniform(-2e-4, 2e-4, received.size))
+    found = rate_of_drift(sent, received + random.uniform(-2e-4, 2e-4, received.size))
     assert abs(found.value - 7e-5) < found.most
 
 
 def test_stamps_that_are_not_regular_tell_no_rate():
     random = np.random.default_rng(1)
     regular = 0.0025 * np.arange(2000)
-    assert rates_apart(regular, np.sort(random.uniform(0.0, 5.0, 2000))) is None
-    assert rates_apart(regular[:40], regular) is None
+    assert rate_of_drift(regular, np.sort(random.uniform(0.0, 5.0, 2000))) is None
+    assert rate_of_drift(regular[:40], regular) is None
     # Periods in no ratio of small whole numbers, as of tasks that have nothing to do with another.
-    assert rates_apart(regular, 0.00207 * np.arange(2000)) is None
+    assert rate_of_drift(regular, 0.00207 * np.arange(2000)) is None
 
 
 def test_a_recording_with_commands_of_another_clock_is_doubted():

@@ -89,7 +89,7 @@ def between(low: float, high: float, error: float, unit: str = "") -> str:
 
 def time_unit(value: float, error: float = 0.0) -> tuple[str, float]:
     """The unit of time in which a number is shown, and that unit in s."""
-    size = max((abs(one) for one in (value, error) if math.isfinite(one)), default=0.0)
+    size = max((abs(number) for number in (value, error) if math.isfinite(number)), default=0.0)
     for unit, factor in TIMES:
         if size >= factor:
             return unit, factor

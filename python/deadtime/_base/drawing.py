@@ -45,9 +45,9 @@ def new_figure(
     figure = empty_figure(width, height)
     ratios = None if rows == 1 or even else [3.0, *([1.0] * (rows - 1))]
     axes = figure.subplots(rows, columns, sharex=rows > 1, height_ratios=ratios)
-    for one in np.ravel(axes):
-        one.spines[["top", "right"]].set_visible(False)
-        one.grid(alpha=0.25)
+    for ax in np.ravel(axes):
+        ax.spines[["top", "right"]].set_visible(False)
+        ax.grid(alpha=0.25)
     return figure, axes
 
 

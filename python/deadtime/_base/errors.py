@@ -140,4 +140,4 @@ def printable(text: str) -> str:
     >>> print(printable("Quad\nrotor \x1b[2J"))
     Quad\nrotor \x1b[2J
     """
-    return "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)
+    return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)

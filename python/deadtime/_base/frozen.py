@@ -69,20 +69,20 @@ def read_only(value: _Value) -> _Value:
     return value
 
 
-def equal(one: Any, other: Any) -> bool:
+def equal(left: Any, right: Any) -> bool:
     """Whether two values are the same; NaN is the same as NaN."""
-    if one is other:
+    if left is right:
         return True
-    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
-        if type(one) is not type(other) or one.shape != other.shape or one.dtype != other.dtype:
+    if isinstance(left, np.ndarray) or isinstance(right, np.ndarray):
+        if type(left) is not type(right) or left.shape != right.shape or left.dtype != right.dtype:
             return False
-        return bool(np.array_equal(one, other, equal_nan=one.dtype.kind in "fc"))
-    if isinstance(one, Mapping) and isinstance(other, Mapping):
-        return one.keys() == other.keys() and all(equal(one[key], other[key]) for key in one)
-    if isinstance(one, (list, tuple)) and isinstance(other, (list, tuple)):
-        same = type(one) is type(other) and len(one) == len(other)
-        return same and all(map(equal, one, other))
-    return bool(one == other) or (one != one and other != other)
+        return bool(np.array_equal(left, right, equal_nan=left.dtype.kind in "fc"))
+    if isinstance(left, Mapping) and isinstance(right, Mapping):
+        return left.keys() == right.keys() and all(equal(left[key], right[key]) for key in left)
+    if isinstance(left, (list, tuple)) and isinstance(right, (list, tuple)):
+        same = type(left) is type(right) and len(left) == len(right)
+        return same and all(map(equal, left, right))
+    return bool(left == right) or (left != left and right != right)
 
 
 class ReadOnlyArrays:

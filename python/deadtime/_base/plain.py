@@ -22,17 +22,17 @@ def json_text(schema: str, found: Mapping[str, Any]) -> str:
 
 def plain_fields(fields: Mapping[str, Any]) -> dict[str, Any]:
     """Convert the fields of a result, by their names, to types of JSON."""
-    return {name: plain(one) for name, one in fields.items()}
+    return {name: plain(value) for name, value in fields.items()}
 
 
 def plain(value: Any) -> Any:
     """Convert to types of JSON; numbers that are not finite become None."""
     if isinstance(value, Mapping):
-        return {str(key): plain(one) for key, one in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
         return plain(value.tolist())
     if isinstance(value, (list, tuple)):
-        return [plain(one) for one in value]
+        return [plain(item) for item in value]
     if isinstance(value, complex):
         return {"re": plain(value.real), "im": plain(value.imag)}
     if isinstance(value, np.generic):

@@ -180,7 +180,7 @@ def is_range(given: object) -> bool:
     return (
         isinstance(given, (tuple, list))
         and len(given) in (2, 3)
-        and not any(isinstance(one, (tuple, list, np.ndarray)) and np.ndim(one) for one in given)
+        and not any(isinstance(end, (tuple, list, np.ndarray)) and np.ndim(end) for end in given)
     )
 
 
@@ -211,7 +211,7 @@ def open_interval(name: str, given: Any) -> Range:
     given = unmasked(name, given)
     if isinstance(given, np.ndarray):
         given = given.tolist()
-    if not is_range(given) or len(given) != 2 or any(isinstance(one, str) for one in given):
+    if not is_range(given) or len(given) != 2 or any(isinstance(end, str) for end in given):
         raise TypeError(f"{name}={given!r}: give a range (low, high). For an open end, give None")
     try:
         low, high = (

@@ -124,7 +124,7 @@ def estimate_loop(asked: NamedLoop, as_json: bool) -> None:
     checks = asked.checks(flights, loops)
     if asked.check:
         show_checks(asked.files, checks, as_json)
-        raise typer.Exit(1 if any(one.refused for one in checks) else 0)
+        raise typer.Exit(1 if any(check.refused for check in checks) else 0)
     findings = grave_findings(asked.files, checks)
     if asked.plant in AUTOMATIC:
         if asked.free is not None or name == "all":
@@ -234,7 +234,8 @@ def _show_all(
                 "estimates": {name: fit.to_dict() for name, fit in comparison.estimates.items()},
                 "refusals": comparison.refusals,
                 "differences": {
-                    name: asdict(one) for name, one in comparison.differences().items()
+                    name: asdict(difference)
+                    for name, difference in comparison.differences().items()
                 },
                 "explanation": comparison.explanation(),
                 "findings": findings,

@@ -83,10 +83,10 @@ def is_answered(loop: NamedLoop) -> bool:
     if loop.columns["command"] is not None:
         return True
     loops = replace(loop, plant=None).loops()
-    if not all(isinstance(one.controller, P) for one in loops):
+    if not all(isinstance(model.controller, P) for model in loops):
         return False
     recordings = (read_recording(file, **loop.columns) for file in loop.files)
-    return all(_at_samples(one, loop.sample_time) for one in recordings)
+    return all(_at_samples(recording, loop.sample_time) for recording in recordings)
 
 
 def _at_samples(recording: Recording, sample_time: float | None) -> bool:
@@ -110,7 +110,7 @@ def estimate_plant(asked: Asked, as_json: bool) -> None:
     known = dict(asked.known)
     if has_loop:
         named = replace(loop, plant=None).loops()
-        known |= {"controller": [one.controller for one in named], "limit": loop.limit}
+        known |= {"controller": [model.controller for model in named], "limit": loop.limit}
         if loop.sample_time is not None:
             known["between"] = "held"
         recordings = [read_recording(file, **columns) for file in asked.files]

@@ -66,14 +66,14 @@ def command(
         return
     found = open_log(log, flight=flight)
     if loop is not None:
-        one = found.loop(loop)
+        log_loop = found.loop(loop)
         if as_json:
-            print_json("log-loop", one.to_dict())
+            print_json("log-loop", log_loop.to_dict())
         else:
-            _print_loop(one)
+            _print_loop(log_loop)
     elif as_json:
-        filters = [one._asdict() for one in filters_of(found)]
-        promises = {name: one.to_dict() for name, one in promises_of(found).items()}
+        filters = [part._asdict() for part in filters_of(found)]
+        promises = {name: promise.to_dict() for name, promise in promises_of(found).items()}
         print_json("log", {**found.to_dict(), "filters": filters, "promises": promises})
     else:
         _print_log(found)
@@ -108,11 +108,13 @@ def _print_log(log: Log) -> None:
     else:
         print_text("for no loop the log contains both the setpoint and the response", "yellow")
     if log.key_parameters:
-        _print_some("parameters", [f"{name} {one:g}" for name, one in log.key_parameters.items()])
+        _print_some(
+            "parameters", [f"{name} {value:g}" for name, value in log.key_parameters.items()]
+        )
     for line in filter_lines(log):
         print_text(line)
-    for one in advice(log):
-        print_text(f"next: {one.text}")
+    for suggestion in advice(log):
+        print_text(f"next: {suggestion.text}")
     if log.link is not None:
         print_text(log.link.summary())
     for remark in log.remarks:
@@ -129,10 +131,10 @@ def _print_some(what: str, words: list[str]) -> None:
 
 
 def _row(loop: LogLoop, promise: Promise | None) -> tuple[str, ...]:
-    rates = dict.fromkeys(f"{one.rate:.3g}" for one in (loop.setpoint, loop.response))
+    rates = dict.fromkeys(f"{signal.rate:.3g}" for signal in (loop.setpoint, loop.response))
     return (
         loop.name,
-        *(_QUATERNION.sub("", one.source) for one in (loop.setpoint, loop.response)),
+        *(_QUATERNION.sub("", signal.source) for signal in (loop.setpoint, loop.response)),
         ", ".join(rates),
         f"{loop.followed:.1f} s" if loop.segments else "never",
         "" if promise is None else promise.short(),

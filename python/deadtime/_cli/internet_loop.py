@@ -78,8 +78,8 @@ def command(
             progress=begin,
         )
     printed = {
-        float(one): delay_by_dominant_root(one, percent / 100.0)
-        for one, percent in PRINTED_OVERSHOOTS.items()
+        float(printed_gain): delay_by_dominant_root(printed_gain, percent / 100.0)
+        for printed_gain, percent in PRINTED_OVERSHOOTS.items()
     }
     if plot is not None:
         figure, axes = new_figure(10.0, 4.2, columns=2)

@@ -120,8 +120,8 @@ def command(
     found = []
     with without_waiting_for_threads():
         for path in logs:
-            one = _opened(path, columns, flight)
-            found.append(_estimated(one, axis, loop, as_json, verbose))
+            log = _opened(path, columns, flight)
+            found.append(_estimated(log, axis, loop, as_json, verbose))
     if as_json:
         _print_json(found)
     elif len(found) == 2:
@@ -130,7 +130,7 @@ def command(
         written = found[0].report(out)
         if not as_json:
             print_text(f"report: {written}", wrapped=False)
-    if not any(one.estimated for one in found):
+    if not any(result.estimated for result in found):
         raise typer.Exit(NONE)
 
 
@@ -167,9 +167,9 @@ def _opened(path: Path, columns: Mapping[str, str | None], flight: int | None) -
 
 def _of_bag(path: Path, columns: Mapping[str, str | None]) -> Recording:
     bag = open_bag(path)
-    told, came = columns["command"], columns["output"]
-    if told is None or came is None:
-        names = [f"{one}:{field}" for one, topic in bag.topics.items() for field in topic.fields]
+    commands, outputs = columns["command"], columns["output"]
+    if commands is None or outputs is None:
+        names = [f"{name}:{field}" for name, topic in bag.topics.items() for field in topic.fields]
         more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
         raise ValueError(
             f"{path} is a bag: give the setpoint by --command and the response by --output, each "
@@ -180,7 +180,7 @@ def _of_bag(path: Path, columns: Mapping[str, str | None]) -> Recording:
         raise ValueError(
             f"{path} is a bag, whose messages have times of their own: leave --time out"
         )
-    return bag.recording(told, came, columns["reference"])
+    return bag.recording(commands, outputs, columns["reference"])
 
 
 def _estimated(
@@ -199,8 +199,8 @@ def _estimated(
         print_text(table.head(), "bold", wrapped=False)
     with results(f"{len(wanted)} times", len(wanted), quiet=quiet) as tell:
 
-        def show(one: LoopLatency) -> None:
-            tell(None if in_full else table.row(one))
+        def show(result: LoopLatency) -> None:
+            tell(None if in_full else table.row(result))
 
         found = latency(log, axes=axes, loops=loops, progress=show)
     if quiet:
@@ -218,12 +218,12 @@ def _print_json(found: list[Latency]) -> None:
     if len(found) == 1:
         print_json("latency", found[0].to_dict())
         return
-    changes = [one.to_dict() for one in compare_latencies(*found)]
-    print_json("latency-change", {"logs": [one.to_dict() for one in found], "changes": changes})
+    changes = [change.to_dict() for change in compare_latencies(*found)]
+    print_json("latency-change", {"logs": [log.to_dict() for log in found], "changes": changes})
 
 
-def _print_changes(one: Latency, other: Latency) -> None:
-    changes = compare_latencies(one, other)
+def _print_changes(first: Latency, second: Latency) -> None:
+    changes = compare_latencies(first, second)
     if not changes:
         print_text("for no loop a response time was found in both logs", "yellow")
         return
@@ -238,5 +238,5 @@ def _print_changes(one: Latency, other: Latency) -> None:
         )
         for change in changes
     ]
-    heads = ("loop", "from", one.source, other.source, "change, 95 %", "outcome")
+    heads = ("loop", "from", first.source, second.source, "change, 95 %", "outcome")
     print_table(results_table(heads, rows, left=LEFT))

@@ -86,18 +86,18 @@ def _show(title: str, part: Part) -> None:
     if part.comparisons:
         rows = [
             (
-                one.where,
-                one.quantity,
-                one.printed,
-                one.shown,
-                f"[{STYLES[one.verdict]}]{one.outcome}[/]",
+                row.where,
+                row.quantity,
+                row.printed,
+                row.shown,
+                f"[{STYLES[row.verdict]}]{row.outcome}[/]",
             )
-            for one in part.comparisons
+            for row in part.comparisons
         ]
         print_table(results_table(HEADS[:5], rows, left=("where", "what", "verdict")))
     for grid in part.grids():
         print_table(results_table(grid.heads, grid.rows, grid.title, grid.heads[:1]))
-    unsettled = [one for one in part.comparisons if one.note and one.verdict not in SETTLED]
-    print_points(f"{one.quantity}: {one.note}" for one in unsettled)
+    unsettled = [row for row in part.comparisons if row.note and row.verdict not in SETTLED]
+    print_points(f"{row.quantity}: {row.note}" for row in unsettled)
     print_points(part.findings())
     print_text("")

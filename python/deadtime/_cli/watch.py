@@ -93,7 +93,7 @@ def command(
                 rows += 1
                 if shown is not None:
                     shown.show(estimate)
-                if not found or _is_told(estimate, found[-1], every):
+                if not found or _line_is_due(estimate, found[-1], every):
                     found.append(estimate)
                     if not as_json:
                         print_text(_said(estimate))
@@ -164,7 +164,7 @@ def _estimates(
             yield estimator.update(*event)
 
 
-def _is_told(now: OnlineEstimate, last: OnlineEstimate, every: float) -> bool:
+def _line_is_due(now: OnlineEstimate, last: OnlineEstimate, every: float) -> bool:
     """Whether a line is due: by time, or because of news."""
     is_news = now.changed or now.verdict != last.verdict or now.known != last.known
     return is_news or now.time - last.time >= every

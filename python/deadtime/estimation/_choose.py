@@ -87,7 +87,7 @@ class PlantChoice(ReadOnlyArrays):
         """Probability of each plant that may be taken, if all were as probable before."""
         likely = {name: self.criteria[name] for name in _reliable(self.estimates)}
         least = min(likely.values())
-        shares = {name: math.exp(0.5 * (least - one)) for name, one in likely.items()}
+        shares = {name: math.exp(0.5 * (least - criterion)) for name, criterion in likely.items()}
         return {name: share / sum(shares.values()) for name, share in shares.items()}
 
     def ci(self, level: float = 0.95) -> tuple[float, float]:
@@ -103,13 +103,13 @@ class PlantChoice(ReadOnlyArrays):
         """
         from scipy import special
 
-        one = float(special.erf(math.sqrt(0.5)))
+        one_sigma = float(special.erf(math.sqrt(0.5)))
         weights = {name: weight for name, weight in self.weights.items() if weight > LEAST}
         fits = {name: self.estimates[name] for name in weights}
         ends = [fit.ci(level, "delay+lag") for fit in fits.values()]
         low, high = min(low for low, _ in ends), max(high for _, high in ends)
         parts = [
-            (weight / sum(weights.values()), fit.delay_plus_lag, *fit.ci(one, "delay+lag"))
+            (weight / sum(weights.values()), fit.delay_plus_lag, *fit.ci(one_sigma, "delay+lag"))
             for weight, fit in zip(weights.values(), fits.values(), strict=True)
         ]
         return mixture_interval(parts, level, (low, high), (high - low) / PLACES)
@@ -228,11 +228,11 @@ def choose_plant(
     >>> import numpy as np
     >>> import deadtime as dtm
     >>> time = np.arange(200) * 0.02
-    >>> told = np.where(time < 0.3, 0.0, 0.2 * np.sign(np.sin(3.7 * (time - 0.3))))
+    >>> command = np.where(time < 0.3, 0.0, 0.2 * np.sign(np.sin(3.7 * (time - 0.3))))
     >>> vehicle = dtm.FactoredPlant([0.15, 0.05]).transfer_function() * dtm.delay(0.047)
-    >>> attitude = np.ravel(vehicle.simulate(time, told).outputs)
+    >>> attitude = np.ravel(vehicle.simulate(time, command).outputs)
     >>> attitude = attitude + 0.003 * np.random.default_rng(1).standard_normal(200)
-    >>> flight = dtm.Recording(time, told, attitude, command=told)
+    >>> flight = dtm.Recording(time, command, attitude, command=command)
     >>> known = dtm.ControlLoop(dtm.FirstOrder(), dtm.P(1.0), sample_time=0.02)
     >>> choice = dtm.estimation.choose_plant(flight, known, most_lags=2)
     >>> choice.chosen
@@ -249,7 +249,7 @@ def choose_plant(
     if isinstance(chosen, (OutputError, Waveform)):
         chosen = replace(chosen, rivals=False)
     loops = [run.loop for run in runs]
-    if not all(one.plant.is_rational for one in loops):
+    if not all(control_loop.plant.is_rational for control_loop in loops):
         raise ValueError(
             "the plant has delays inside, but choose_plant fits a gain, "
             "lags and a zero, all behind one delay. Give an Integrator() "
@@ -265,11 +265,11 @@ def choose_plant(
         for shares in ((0.0,), ZEROS) if size else ((0.0,),):
             with_zero = shares is ZEROS
             label = f"{name}{', zero' * with_zero}"
-            free = ["delay", *(one for one in plant.parameters if with_zero or one != "zero")]
+            free = ["delay", *(key for key in plant.parameters if with_zero or key != "zero")]
             fits = []
             for share in shares:
                 started = replace(plant, zero=share * size)
-                known = [one.replace(plant=started) for one in loops]
+                known = [control_loop.replace(plant=started) for control_loop in loops]
                 try:
                     fits.append(
                         estimate_delay(recording, known, method=chosen, free=free, window=window)

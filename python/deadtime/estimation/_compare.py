@@ -158,15 +158,15 @@ class Comparison:
         best = self.best
         reference = next(name for name, fit in self.estimates.items() if fit is best)
         sentences: list[str] = []
-        for name, one in self.differences().items():
-            if not one.limits:
+        for name, gap in self.differences().items():
+            if not gap.limits:
                 continue
             label = _label(name)
-            said = any(one.limits in sentence for sentence in sentences)
+            said = any(gap.limits in sentence for sentence in sentences)
             sentences.append(
-                f"{label[0].upper()}{label[1:]}, on {one.rows} rows from {one.window[0]:g} to "
-                f"{one.window[1]:g} s: {abs(one.seconds):.3f} s {_side(one)} {_label(reference)}"
-                f"{_in_errors(one)}.{'' if said else f' {one.limits}'}"
+                f"{label[0].upper()}{label[1:]}, on {gap.rows} rows from {gap.window[0]:g} to "
+                f"{gap.window[1]:g} s: {abs(gap.seconds):.3f} s {_side(gap)} {_label(reference)}"
+                f"{_in_errors(gap)}.{'' if said else f' {gap.limits}'}"
             )
         return sentences
 
@@ -254,15 +254,15 @@ def _label(name: str) -> str:
     return LABELS.get(name, name.replace("_", " "))
 
 
-def _side(one: MethodDifference) -> str:
-    return "more than" if one.seconds >= 0.0 else "less than"
+def _side(gap: MethodDifference) -> str:
+    return "more than" if gap.seconds >= 0.0 else "less than"
 
 
-def _in_errors(one: MethodDifference) -> str:
+def _in_errors(gap: MethodDifference) -> str:
     """A difference in standard errors, in brackets."""
-    if one.standard_errors is None:
+    if gap.standard_errors is None:
         return ""
-    return f" ({abs(one.standard_errors):.2g} standard errors of this difference)"
+    return f" ({abs(gap.standard_errors):.2g} standard errors of this difference)"
 
 
 def _signed(value: float | None) -> str:
@@ -354,6 +354,6 @@ def compare_methods(
     if not any(name in estimates for name in fits):
         raise NotIdentifiableError(refusals["waveform"])
     best = Comparison(estimates, refusals).best
-    name = next(name for name, one in estimates.items() if one is best)
+    name = next(name for name, estimate in estimates.items() if estimate is best)
     best = beside_rivals(best, runs[0], METHODS[best.method]())
     return Comparison(estimates | {name: best}, refusals)

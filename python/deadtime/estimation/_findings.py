@@ -19,7 +19,7 @@ from deadtime.recordings import Finding
 
 #: Share of the 95 % interval of the delay by which a finding may move it unsaid. Larger: intervals
 #: hold the truth less often than they say; smaller: answers that hold are doubted.
-WORTH = 0.25
+LEAST_MOVE = 0.25
 
 #: Findings that concern a fit of the loop, and not one of the response to a logged command.
 OF_THE_LOOP = ("command_differs", "command_gain", "command_offset", "output_range", "rows_repeated")
@@ -73,14 +73,14 @@ def bound(fit: DelayEstimate, runs: Sequence[Run], *, of_loop: bool) -> DelayEst
         for run in runs
         for finding in (run.check.findings if run.check is not None else ())
         if finding.severity == "warning" and (of_loop or finding.code not in OF_THE_LOOP)
-        if _is_worth(finding, fit)
+        if _may_move_delay(finding, fit)
     )
     for why in doubts:
         fit = fit.doubted(why)
     return fit
 
 
-def _is_worth(finding: Finding, fit: DelayEstimate) -> bool:
+def _may_move_delay(finding: Finding, fit: DelayEstimate) -> bool:
     """Whether a finding may move the delay by more than a share of its interval."""
     moved = finding.shift + finding.share * fit.delay
     if math.isinf(moved) or not moved:
@@ -88,4 +88,4 @@ def _is_worth(finding: Finding, fit: DelayEstimate) -> bool:
     if "delay" not in fit.free or not fit.calibrated:
         return False
     low, high = fit.ci(0.95)
-    return moved > WORTH * (high - low)
+    return moved > LEAST_MOVE * (high - low)

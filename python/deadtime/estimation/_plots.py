@@ -75,8 +75,8 @@ def _check_axes(axes: Sequence[Axes], count: int) -> None:
     """Refuse another number of axes, and bare those of the right one."""
     if len(axes) != count:
         raise ValueError(f"ax has {len(axes)} axes: give {count} matplotlib axes")
-    for one in axes:
-        bare_axes(one)
+    for ax in axes:
+        bare_axes(ax)
 
 
 def shown_figure(width: float, height: float) -> Figure:

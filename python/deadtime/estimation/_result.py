@@ -247,7 +247,7 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
         """That of Student's distribution that goes with the standard errors at a level."""
         from scipy import special
 
-        freedom = float(max(1, sum(one.residuals.size for one in self.runs) - len(self.free)))
+        freedom = float(max(1, sum(run.residuals.size for run in self.runs) - len(self.free)))
         if self._profile is not None:
             freedom = min(self._profile.freedom_of(name) for name in self.free)
         return float(special.stdtrit(freedom, 0.5 + level / 2))
@@ -345,8 +345,8 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
         if "delay" not in self.free or not square:
             return self
         stderr = {
-            name: math.sqrt(one**2 + square) if holds_delay(name) else one
-            for name, one in self.stderr.items()
+            name: math.sqrt(value**2 + square) if holds_delay(name) else value
+            for name, value in self.stderr.items()
         }
         cov, place = self.cov.copy(), self.free.index("delay")
         cov[place, place] += square
@@ -468,13 +468,13 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
         for name, stderr in self.stderr.items():
             value, unit = self._value(name), unit_of(name)
             if self.verdict != "reliable":
-                told = claimed(self.verdict, value, stderr, unit)
+                words = claimed(self.verdict, value, stderr, unit)
             elif self.calibrated:
-                told = f"{stated(value, stderr, unit):<18}"
-                told += f" 95 %: {between(*self.ci(0.95, name), stderr, unit)}"
+                words = f"{stated(value, stderr, unit):<18}"
+                words += f" 95 %: {between(*self.ci(0.95, name), stderr, unit)}"
             else:
-                told = stated(value, math.nan, unit)
-            lines.append(f"  {name:<{width}} {told}")
+                words = stated(value, math.nan, unit)
+            lines.append(f"  {name:<{width}} {words}")
         if not self.calibrated:
             lines.append(f"  no interval: {self.uncalibrated}")
         if self.crb is not None and "delay" in self.crb.stderr:

@@ -82,7 +82,7 @@ class SharedNumber:
             f"of such differences or larger: p = {self.p_value:.2g})"
         )
         if not self.agree:
-            each = ", ".join(shown(one, error, unit) for one in self.estimates)
+            each = ", ".join(shown(estimate, error, unit) for estimate in self.estimates)
             return f"{text}. The estimates contradict one another: {each}"
         if self.verdict != "reliable":
             text += ". One of the estimates is only an indication"
@@ -127,14 +127,14 @@ def shared_number(
     >>> import numpy as np
     >>> import deadtime as dtm
     >>> time = np.arange(300) * 0.02
-    >>> told = 0.2 * np.sign(np.sin(3.7 * (time - 0.3))) * (time > 0.3)
+    >>> command = 0.2 * np.sign(np.sin(3.7 * (time - 0.3))) * (time > 0.3)
     >>> loop = dtm.ControlLoop(dtm.FactoredPlant([0.1]), dtm.P(1.0), sample_time=0.02)
     >>> noise = 0.003 * np.random.default_rng(1).standard_normal((2, 300))
     >>> found = []
-    >>> for lag, one in zip((0.05, 0.15), noise):
+    >>> for lag, error in zip((0.05, 0.15), noise):
     ...     vehicle = dtm.FactoredPlant([lag]).transfer_function() * dtm.delay(0.06)
-    ...     angle = np.ravel(vehicle.simulate(time, told).outputs) + one
-    ...     axis = dtm.Recording(time, told, angle, command=told)
+    ...     angle = np.ravel(vehicle.simulate(time, command).outputs) + error
+    ...     axis = dtm.Recording(time, command, angle, command=command)
     ...     found.append(dtm.estimate_delay(axis, loop, free=("delay", "gain", "lag_1")))
     >>> both = dtm.estimation.shared_number(found)
     >>> both.agree, both.interval[0] < 0.06 < both.interval[1]
@@ -147,11 +147,11 @@ def shared_number(
             f"{len(estimates)} estimates were given: a shared parameter needs two or more"
         )
     confidence(level)
-    ends = [one.ci(level, name) for one in estimates]
-    values = [one._value(name) for one in estimates]
+    ends = [fit.ci(level, name) for fit in estimates]
+    values = [fit._value(name) for fit in estimates]
 
     def total(value: float) -> float:
-        return math.fsum(float(one.profile(name, [value])[1][0]) ** 2 for one in estimates)
+        return math.fsum(float(fit.profile(name, [value])[1][0]) ** 2 for fit in estimates)
 
     width = min(high - low for low, high in ends)
     low, high = min(low for low, _ in ends), max(high for _, high in ends)
@@ -169,6 +169,6 @@ def shared_number(
         estimates=tuple(values),
         p_value=p_value,
         verdict=verdict_if(
-            p_value >= native.LEVEL_OF_TESTS and all(one.verdict == "reliable" for one in estimates)
+            p_value >= native.LEVEL_OF_TESTS and all(fit.verdict == "reliable" for fit in estimates)
         ),
     )

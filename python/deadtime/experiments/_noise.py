@@ -88,9 +88,9 @@ class FlightNoise:
     >>> loop = dtm.ControlLoop(
     ...     dtm.Integrator(0.85), dtm.P(1.6), delay=0.3, sample_time=0.065, limit=1.0
     ... )
-    >>> calm = dtm.Experiment.step(7.8).run(loop, noise=0.005, seed=1)
+    >>> still = dtm.Experiment.step(7.8).run(loop, noise=0.005, seed=1)
     >>> windy = dtm.Experiment.step(7.8).run(loop, noise=gusts, seed=1)
-    >>> [round(float(run.output[-60:].std()), 3) for run in (calm, windy)]
+    >>> [round(float(run.output[-60:].std()), 3) for run in (still, windy)]
     [0.004, 0.04]
     """
 

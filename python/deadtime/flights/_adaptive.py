@@ -114,21 +114,21 @@ class AdaptiveStudy:
     def errors(self) -> tuple[float, float]:
         """Mean absolute errors of the two flights."""
         flights = (self.robust, self.adaptive)
-        first, second = (float(np.mean(np.abs(one.reference - one.output))) for one in flights)
+        first, second = (float(np.mean(np.abs(run.reference - run.output))) for run in flights)
         return first, second
 
     @property
     def shares(self) -> tuple[float, ...]:
         """Share of the samples in each set."""
-        numbers = np.array([one.number for one in self.choices])
+        numbers = np.array([choice.number for choice in self.choices])
         return tuple(float(np.mean(numbers == i)) for i in range(len(self.schedule.sets)))
 
     def lines(self) -> list[str]:
         """The outcome in a few lines."""
         robust, adaptive = self.errors
         used = ", ".join(
-            f"{100.0 * share:.0f} % in the set for delays up to {one.delays[1]:.3g} s"
-            for one, share in zip(self.schedule.sets, self.shares, strict=True)
+            f"{100.0 * share:.0f} % in the set for delays up to {gain_set.delays[1]:.3g} s"
+            for gain_set, share in zip(self.schedule.sets, self.shares, strict=True)
         )
         return [
             *self.schedule.summary().splitlines(),
@@ -139,16 +139,16 @@ class AdaptiveStudy:
 
     def rows(self) -> list[tuple[str, ...]]:
         """A row for each step, with the headings `STEP_COLUMNS`."""
-        times = np.array([one.time - self.choices[0].time for one in self.choices])
+        times = np.array([chosen_set.time - self.choices[0].time for chosen_set in self.choices])
         found: list[tuple[str, ...]] = []
-        for one, other in zip(measures_of(self.robust), measures_of(self.adaptive), strict=False):
+        for fixed, other in zip(measures_of(self.robust), measures_of(self.adaptive), strict=False):
             place = int(np.searchsorted(times, other.step.time, side="right")) - 1
             choice = self.choices[max(0, place)]
             found.append(
                 (
-                    f"{one.step.time:.0f}",
-                    f"{one.overshoot:.1f}",
-                    settled(one.settling_time),
+                    f"{fixed.step.time:.0f}",
+                    f"{fixed.overshoot:.1f}",
+                    settled(fixed.settling_time),
                     f"{other.overshoot:.1f}",
                     settled(other.settling_time),
                     f"{choice.low:.2f} to {choice.high:.2f}",
@@ -161,8 +161,8 @@ class AdaptiveStudy:
         """Plain values for JSON."""
         return {
             "sets": [
-                {"gains": dict(one.gains), "delays": list(one.delays), "share": share}
-                for one, share in zip(self.schedule.sets, self.shares, strict=True)
+                {"gains": dict(gain_set.gains), "delays": list(gain_set.delays), "share": share}
+                for gain_set, share in zip(self.schedule.sets, self.shares, strict=True)
             ],
             "proved_step": self.schedule.proof.step,
             "error_robust": self.errors[0],
@@ -256,9 +256,9 @@ def fly_adaptive(
     robust, adaptive = (_read(path, study) for path in paths)
     choices = tuple(controls[1].choices)
     with Journal(folder / f"choices-{axis}.csv", CHOICE) as journal:
-        for one in choices:
+        for row in choices:
             journal.write(
-                (one.time - choices[0].time, one.low, one.high, one.number, int(one.covered))
+                (row.time - choices[0].time, row.low, row.high, row.number, int(row.covered))
             )
     return AdaptiveStudy(schedule, robust, adaptive, choices)
 

@@ -109,9 +109,9 @@ def as_they_took_effect(sent: Effects, report: Array, setpoint: Array) -> Effect
     # A lost command waits for the next one that is found.
     effect = np.where(found, middle[place], np.inf)
     effect = np.minimum.accumulate(effect[::-1])[::-1]
-    told = np.isfinite(effect)
-    delay = effect[told] - time[told]
-    kept = delay[found[told]]
+    effective = np.isfinite(effect)
+    delay = effect[effective] - time[effective]
+    kept = delay[found[effective]]
     variance = float(np.var(kept))
     square = float(np.mean(between[place[found]] ** 2)) / 12.0
     share = max(0.0, 1.0 - square / variance) if variance > 0.0 else 0.0
@@ -129,12 +129,12 @@ def as_they_took_effect(sent: Effects, report: Array, setpoint: Array) -> Effect
 
 def error_of_mean(flights: Sequence[Effects]) -> float:
     """Standard deviation of an estimate of the delay by what the times leave open, s."""
-    squares = [np.diff(one.values) ** 2 for one in flights]
-    total = sum(float(np.sum(one)) for one in squares)
+    squares = [np.diff(flight.values) ** 2 for flight in flights]
+    total = sum(float(np.sum(square)) for square in squares)
     if total == 0.0:
         return 0.0
     found = sum(
-        one.error**2 * float(np.sum(square**2))
-        for one, square in zip(flights, squares, strict=True)
+        flight.error**2 * float(np.sum(square**2))
+        for flight, square in zip(flights, squares, strict=True)
     )
     return math.sqrt(found) / total

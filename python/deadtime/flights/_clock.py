@@ -69,7 +69,7 @@ class VehicleClock:
         whole = places < places[-1]
         if np.unique(places[whole]).size < FEWEST:
             return None
-        stretches = [np.flatnonzero(places == one) for one in np.unique(places[whole])]
+        stretches = [np.flatnonzero(places == stretch) for stretch in np.unique(places[whole])]
         lines = [cls._through(stamp, difference, stretches, share) for share in (LEAST, MEDIAN)]
         return min(lines, key=lambda line: line.misfit / line.allowed)
 

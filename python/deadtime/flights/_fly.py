@@ -154,22 +154,24 @@ def fly_axes(
     learned = []
     for plan in plans:
         report(f"estimating the delay of {plan.axis}")
-        mine = [one for one in flown if one.axis.name == plan.axis]
+        mine = [flight for flight in flown if flight.axis.name == plan.axis]
         learned.append(learn(mine, plan, shaping.get(plan.axis), report))
     # The best P first: if it does not perform as designed, PV should not be tried.
     designed = [
         PlannedFlight(plan, controller, plan.checked_hold)
-        for plan, one in zip(plans, learned, strict=True)
-        for controller in (found.loop.controller for found in (one.proportional, one.designed))
+        for plan, result in zip(plans, learned, strict=True)
+        for controller in (
+            found.loop.controller for found in (result.proportional, result.designed)
+        )
         if isinstance(controller, (P, PV))
     ]
-    for plan, one in zip(plans, learned, strict=True):
-        for warning in one.warnings():
+    for plan, result in zip(plans, learned, strict=True):
+        for warning in result.warnings():
             warn(f"{plan.axis}: {warning}" if len(plans) > 1 else warning)
     checked, _ = run(fly_all(connect, designed, folder, len(flown) + 1, total, report))
     return [
-        FlightStudy(plan, one, tuple(c for c in checked if c.axis.name == plan.axis))
-        for plan, one in zip(plans, learned, strict=True)
+        FlightStudy(plan, result, tuple(c for c in checked if c.axis.name == plan.axis))
+        for plan, result in zip(plans, learned, strict=True)
     ]
 
 
@@ -195,9 +197,9 @@ async def fly_all(
     """Take off, make all flights one after the other, and land; `number` is that of the first."""
     made = []
     # Before the take-off: what is needed for it may have to be loaded first.
-    controls = [_control(one) for one in flights]
+    controls = [_control(flight) for flight in flights]
     shaping: dict[str, Shaping | None] = {}
-    axes = tuple(dict.fromkeys(one.plan.axis for one in flights))
+    axes = tuple(dict.fromkeys(flight.plan.axis for flight in flights))
     # The journals are closed last, so that a slow disk does not keep the vehicle in the air.
     with ExitStack() as journals:
         async with connect() as vehicle:
@@ -206,20 +208,20 @@ async def fly_all(
                 shaping = {axis: await vehicle.shaping(axis) for axis in axes}
             await vehicle.take_off()
             origin = await vehicle.state()
-            for place, (one, control) in enumerate(zip(flights, controls, strict=True), number):
-                name = f"{one.plan.axis} {named(one.controller)}"
+            for place, (flight, control) in enumerate(zip(flights, controls, strict=True), number):
+                name = f"{flight.plan.axis} {named(flight.controller)}"
                 progress(f"flight {place} of {total or len(flights)}: {name}")
-                kind = type(one.controller).__name__
-                path = folder / f"flight-{place}-{one.plan.axis}-{kind}.csv"
-                messages = await _fly_one(vehicle, one, control, path, journals, origin)
-                made.append((one, path, messages))
+                kind = type(flight.controller).__name__
+                path = folder / f"flight-{place}-{flight.plan.axis}-{kind}.csv"
+                messages = await _fly_one(vehicle, flight, control, path, journals, origin)
+                made.append((flight, path, messages))
             await vehicle.land()
-    return [_read(one, path, messages) for one, path, messages in made], shaping
+    return [_read(flight, path, messages) for flight, path, messages in made], shaping
 
 
-def _control(one: PlannedFlight) -> AxisControl:
-    smoothing = getattr(one.controller, "filter", None) or PAPER_FILTER
-    return AxisControl(one.controller, one.plan.sample_time, smoothing)
+def _control(flight: PlannedFlight) -> AxisControl:
+    smoothing = getattr(flight.controller, "filter", None) or PAPER_FILTER
+    return AxisControl(flight.controller, flight.plan.sample_time, smoothing)
 
 
 def _check_axes(vehicle: Vehicle, axes: Sequence[str]) -> None:
@@ -231,9 +233,9 @@ def _check_axes(vehicle: Vehicle, axes: Sequence[str]) -> None:
         )
 
 
-def _read(one: PlannedFlight, path: Path, messages: Path | None) -> FlownSteps:
+def _read(flight: PlannedFlight, path: Path, messages: Path | None) -> FlownSteps:
     """The flight, read back from its file."""
-    axis = one.plan.flown_axis
+    axis = flight.plan.flown_axis
     recording = read_recording(
         path,
         time="time_s",
@@ -241,22 +243,22 @@ def _read(one: PlannedFlight, path: Path, messages: Path | None) -> FlownSteps:
         output=axis.columns[0],
         command=f"command_{axis.unit}_s",
     )
-    plan = one.plan
+    plan = flight.plan
     return FlownSteps(
-        one.controller, recording, path, messages, plan.sample_time, plan.settle, axis
+        flight.controller, recording, path, messages, plan.sample_time, plan.settle, axis
     )
 
 
 async def _fly_one(
     vehicle: Vehicle,
-    one: PlannedFlight,
+    flight: PlannedFlight,
     control: AxisControl,
     path: Path,
     journals: ExitStack,
     origin: VehicleState,
 ) -> Path | None:
     """Make one flight with a vehicle in the air; return the file of its messages, if any."""
-    plan, axis = one.plan, one.plan.flown_axis
+    plan, axis = flight.plan, flight.plan.flown_axis
     begin = now()
     journal = journals.enter_context(Journal(path, row_columns(axis)))
     messages = None
@@ -266,7 +268,7 @@ async def _fly_one(
         saved = journals.enter_context(Journal(messages, columns))
         _keep_messages(vehicle, AxisReader(axis, origin), saved, begin)
     try:
-        programme = plan.programme(one.hold)
+        programme = plan.programme(flight.hold)
         await fly_steps(vehicle, axis, control, programme, plan.limits, journal, begin, origin)
     finally:
         if isinstance(vehicle, PassesMessages):
@@ -280,11 +282,11 @@ def _keep_messages(
     vehicle: PassesMessages, reader: AxisReader, journal: Journal, begin: float
 ) -> None:
     """Save every further message, and the echoes of commands with the times of their stamps."""
-    apart = isinstance(vehicle, PassesEchoes)
+    has_echoes = isinstance(vehicle, PassesEchoes)
 
     def save(state: VehicleState) -> None:
         axis = reader.output(state), reader.rate(state), reader.setpoint(state)
-        stamps = state.vehicle_time, None if apart else state.vehicle_time
+        stamps = state.vehicle_time, None if has_echoes else state.vehicle_time
         journal.write((state.time - begin, *stamps, state.sequence, *axis))
 
     def save_echo(echo: Echo) -> None:

@@ -59,7 +59,7 @@ class Learned:
     @property
     def irregular(self) -> tuple[str, ...]:
         """Why the times of the flights are not to be relied on; empty where they are."""
-        found = [f"{one.name}: {one.irregular}" for one in self.flights if one.irregular]
+        found = [f"{run.name}: {run.irregular}" for run in self.flights if run.irregular]
         return tuple(found)
 
     @property
@@ -142,10 +142,10 @@ def learn(
     """
     largest = plan.limits.largest(plan.flown_axis)
     known = [
-        ControlLoop(Integrator(), one.controller, sample_time=one.sample_time, limit=largest)
-        for one in flights
+        ControlLoop(Integrator(), run.controller, sample_time=run.sample_time, limit=largest)
+        for run in flights
     ]
-    overshoot = tuple(_by_overshoot(one, loop) for one, loop in zip(flights, known, strict=True))
+    overshoot = tuple(_by_overshoot(run, loop) for run, loop in zip(flights, known, strict=True))
     fit, tried = fit_by_evidence(flights, largest, shaping, progress)
     split, unsplit = _split(flights)
     progress(f"designing for the delay of {plan.axis}")
@@ -187,8 +187,8 @@ def _by_overshoot(flight: FlownSteps, loop: ControlLoop) -> DelayEstimate | str:
 
 def _split(flights: Sequence[FlownSteps]) -> tuple[DelaySplit | None, str]:
     """The parts of the delay, or the reason why they are unknown."""
-    read = [read_telemetry(one) for one in flights]
-    messages = [one for one in read if one is not None]
+    read = [read_telemetry(flight) for flight in flights]
+    messages = [telemetry for telemetry in read if telemetry is not None]
     if not messages or len(messages) < len(flights):
         return None, "the vehicle does not report its setpoint and its speed"
     try:

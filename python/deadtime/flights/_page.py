@@ -101,7 +101,7 @@ def _described(studies: Sequence[FlightStudy], vehicle: str) -> str:
     flown = []
     for study in studies:
         axis, plan = study.axis, study.plan
-        gains = ", ".join(f"{one.controller.gains['Kp']:g}" for one in study.learned.flights)
+        gains = ", ".join(f"{flight.controller.gains['Kp']:g}" for flight in study.learned.flights)
         largest = plan.limits.largest(axis)
         flown.append(
             f"steps of the {axis.words} by {plan.step:g} {axis.unit} under P control with Kp = "
@@ -134,8 +134,10 @@ def _fitted(study: FlightStudy) -> str:
         )
     )
     if len(learned.tried) > 1:
-        words += f" These plants were tried: {'; '.join(one.line(small) for one in learned.tried)}."
-    ages = [one.age for one in learned.flights]
+        words += (
+            f" These plants were tried: {'; '.join(case.line(small) for case in learned.tried)}."
+        )
+    ages = [flight.age for flight in learned.flights]
     if all(age is not None for age in ages):
         mean = sum(age for age in ages if age is not None) / len(ages)
         words += (

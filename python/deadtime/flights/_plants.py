@@ -111,23 +111,23 @@ def fit_by_evidence(
         If no plant has an estimate; the message is that of the first.
     """
     tried: list[TriedPlant] = []
-    left_open = error_of_mean([one.effects for one in flights if one.effects is not None])
+    left_open = error_of_mean([flight.effects for flight in flights if flight.effects is not None])
     for words, plant, free in candidates(flights[0].axis, shaping):
         if tried:
             progress(f"trying {words}")
         loops = [
-            ControlLoop(plant, one.controller, sample_time=one.sample_time, limit=largest)
-            for one in flights
+            ControlLoop(plant, flight.controller, sample_time=flight.sample_time, limit=largest)
+            for flight in flights
         ]
         try:
             # From the middle of the rest before the first step, where the effect of what was flown
             # before has decayed and the earlier commands are known.
             fit = estimate_delay(
-                [one.measured for one in flights],
+                [flight.measured for flight in flights],
                 loops,
                 method=OutputError(rivals=False),
                 free=free,
-                window=[(0.5 * one.settle, None) for one in flights],
+                window=[(0.5 * flight.settle, None) for flight in flights],
             )
         except NotIdentifiableError as error:
             tried.append(TriedPlant(words, None, str(error)))
@@ -136,7 +136,7 @@ def fit_by_evidence(
         tried.append(TriedPlant(words, fit))
         if fit.verdict == "reliable":
             break
-    found = [one.fit for one in tried if one.fit is not None]
+    found = [trial.fit for trial in tried if trial.fit is not None]
     if not found:
         raise NotIdentifiableError(tried[0].refused)
     if found[-1].verdict == "reliable":
@@ -174,7 +174,7 @@ def for_small_commands(fit: DelayEstimate) -> DelayEstimate:
             den = [
                 slow + fast
                 for slow, fast in zip(
-                    [*(shaped * one for one in den), 0.0], [0.0, *den], strict=True
+                    [*(shaped * coefficient for coefficient in den), 0.0], [0.0, *den], strict=True
                 )
             ]
         return list(num), list(den)

@@ -44,7 +44,7 @@ def plot_telemetry(
     at = flight.recording.steps()[0].time
     low, high = at - BEFORE, at + 2.0
     sent = (telemetry.command_time >= low) & (telemetry.command_time <= high)
-    came = (telemetry.time >= low) & (telemetry.time <= high)
+    received = (telemetry.time >= low) & (telemetry.time <= high)
     upper.step(
         telemetry.command_time[sent] - at,
         telemetry.command[sent],
@@ -53,19 +53,19 @@ def plot_telemetry(
         lw=1.2,
         label="command sent",
     )
-    time = telemetry.time[came] - at
+    time = telemetry.time[received] - at
     upper.step(
         time,
-        telemetry.setpoint[came],
+        telemetry.setpoint[received],
         where="post",
         color=COLOURS[1],
         lw=1.6,
         label="echoed setpoint",
     )
-    upper.plot(time, telemetry.rate[came], color=COLOURS[0], lw=1.0, label="reported speed")
+    upper.plot(time, telemetry.rate[received], color=COLOURS[0], lw=1.0, label="reported speed")
     upper.set(ylabel=f"speed / ({flight.axis.rate_unit})")
     upper.legend(frameon=False, fontsize="small")
-    lower.plot(time, telemetry.output[came], color="0.35", lw=1.2)
+    lower.plot(time, telemetry.output[received], color="0.35", lw=1.2)
     lower.set(xlabel="time after the step / s", ylabel=_output(flight))
     return axes
 

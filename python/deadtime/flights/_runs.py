@@ -214,12 +214,12 @@ class FlownSteps:
     @property
     def overshoot(self) -> float:
         """Mean overshoot of the steps, percent."""
-        return float(np.mean([one.overshoot for one in self.steps]))
+        return float(np.mean([step.overshoot for step in self.steps]))
 
     @property
     def settling_time(self) -> float:
         """Mean settling time of the steps, s; NaN if one does not settle."""
-        return float(np.mean([one.settling_time for one in self.steps]))
+        return float(np.mean([step.settling_time for step in self.steps]))
 
     def first_step(self) -> tuple[float, float]:
         """The part around the first step, s: from rest before it to the next step."""

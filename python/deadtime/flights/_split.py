@@ -100,10 +100,10 @@ def split_delay(flights: Sequence[Telemetry]) -> DelaySplit:
     # The controller is not part of this path; the sample time makes the commands held.
     link = ControlLoop(Integrator(), P(1.0), sample_time=_period(flights[0].command_time))
     transport = estimate_delay(
-        [_followed(one) for one in flights], link, method=METHOD, free=("delay", "gain")
+        [_followed(flight) for flight in flights], link, method=METHOD, free=("delay", "gain")
     )
     own = link.replace(plant=FirstOrder(1.0, GUESS))
-    climbed = [_climbed(one) for one in flights]
+    climbed = [_climbed(flight) for flight in flights]
     free = ("delay", "gain", "time_constant")
     vehicle = estimate_delay(climbed, own, method=METHOD, free=free)
     if vehicle.delay == 0.0:

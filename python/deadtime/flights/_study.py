@@ -58,7 +58,7 @@ class FlightStudy:
     @property
     def before(self) -> FlownSteps:
         """The one of the first flights with the largest gain."""
-        return max(self.learned.flights, key=lambda one: one.controller.gains["Kp"])
+        return max(self.learned.flights, key=lambda flight: flight.controller.gains["Kp"])
 
     @property
     def after(self) -> FlownSteps:
@@ -158,11 +158,11 @@ class FlightStudy:
             "verdict": self.verdict,
             "headline": self.headline(),
             "irregular": list(learned.irregular),
-            "plants": [one.line(small) for one in learned.tried],
+            "plants": [case.line(small) for case in learned.tried],
             "fit": learned.fit.to_dict(),
             "whole_delay": learned.whole_delay,
             "overshoot_method": [
-                one if isinstance(one, str) else one.delay for one in learned.overshoot
+                answer if isinstance(answer, str) else answer.delay for answer in learned.overshoot
             ],
             "transport": None if split is None else split.transport.to_dict(),
             "vehicle": None if split is None else split.vehicle.to_dict(),

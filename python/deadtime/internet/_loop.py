@@ -96,21 +96,21 @@ def run_internet_loop(
         raise ValueError(
             f"methods {sorted(unknown)} do not exist: give some of {', '.join(METHODS)}"
         )
-    stems = [f"{index + 1:02d}-gain-{one.gain:g}-" for index, one in enumerate(trials)]
+    stems = [f"{index + 1:02d}-gain-{variant.gain:g}-" for index, variant in enumerate(trials)]
     for file in [] if folder is None else [folder / f"{a}{b}.csv" for a in stems for b in ENDS]:
         if file.exists():  # refused before the first run
             raise FileExistsError(EEXIST, "the file exists already: give another folder", str(file))
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
     runs = []
-    for one, stem in zip(trials, stems, strict=True):
-        report(f"K = {one.gain:g}: running")
-        reports, recordings = _run(one, mode, folder, stem)
-        report(f"K = {one.gain:g}: estimating")
-        estimates, refusals = _estimate(one, recordings, methods)
+    for variant, stem in zip(trials, stems, strict=True):
+        report(f"K = {variant.gain:g}: running")
+        reports, recordings = _run(variant, mode, folder, stem)
+        report(f"K = {variant.gain:g}: estimating")
+        estimates, refusals = _estimate(variant, recordings, methods)
         runs.append(
             InternetRun(
-                one, reports["plant"], reports["controller"], recordings, estimates, refusals
+                variant, reports["plant"], reports["controller"], recordings, estimates, refusals
             )
         )
     report("replaying the steps")
@@ -130,7 +130,7 @@ def _run(
         start = virtual_time.run if mode == "virtual" else asyncio.run
         report = start(run_trial(trial, folder, stem=stem))
         kept = {"plant": report.plant.recording, "controller": report.controller.recording}
-        return report.to_dict(), {name: one for name, one in kept.items() if one is not None}
+        return report.to_dict(), {name: part for name, part in kept.items() if part is not None}
     with tempfile.TemporaryDirectory() as spare:
         place = Path(spare) if folder is None else folder
         reports = run_processes(trial, place, stem=stem)

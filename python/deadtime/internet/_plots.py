@@ -61,8 +61,8 @@ def _delays(ax: Axes, found: InternetLoop, printed: Mapping[float, float]) -> No
     trips = [run.round_trip for run in found.runs]
     ax.fill_between(
         gains,
-        [1e3 * one["p50"] for one in trips],
-        [1e3 * one["p95"] for one in trips],
+        [1e3 * round_trip["p50"] for round_trip in trips],
+        [1e3 * round_trip["p95"] for round_trip in trips],
         color="0.85",
         label="round trip, median to 95 %",
     )

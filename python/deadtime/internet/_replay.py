@@ -47,11 +47,11 @@ def answer_times(arrivals: Sequence[tuple[int, float]]) -> Array:
 def age_error(times: Array, sample_time: float) -> float:
     """Standard error of the mean age over these answers, s, from its means over segments."""
     samples = np.arange(times.size)
-    came = np.isfinite(times)
-    arrived = samples[came] + np.ceil(times[came] / sample_time - 1e-9).astype(int)
+    answered = np.isfinite(times)
+    arrived = samples[answered] + np.ceil(times[answered] / sample_time - 1e-9).astype(int)
     newest = np.full(times.size, -1)
     inside = arrived < times.size
-    np.maximum.at(newest, arrived[inside], samples[came][inside])
+    np.maximum.at(newest, arrived[inside], samples[answered][inside])
     newest = np.maximum.accumulate(newest)
     ages = (samples - newest)[newest >= 0] * sample_time
     if ages.size < 2 * SEGMENTS:
@@ -81,7 +81,7 @@ def replayed_errors(
     dict of str to ndarray
         For each of `MAPS`, without the steps whose overshoot determines no delay.
     """
-    applied = np.array([_applied(trial, one) for one in times.tolist()])
+    applied = np.array([_applied(trial, time) for time in times.tolist()])
     shifts = np.random.default_rng(seed).integers(times.size, size=count)
     overshoots = [_overshoot(trial, np.roll(applied, -int(shift))) for shift in shifts]
     found = {}
@@ -105,10 +105,10 @@ def interval_of_mean(
     too few errors.
     """
     outside = 0.5 * (1.0 - level)
-    if not errors or min(one.size for one in errors) < 2.0 / outside or math.isnan(error):
+    if not errors or min(sample.size for sample in errors) < 2.0 / outside or math.isnan(error):
         return math.nan, math.nan
     random = np.random.default_rng(seed)
-    drawn = np.mean([random.choice(one, DRAWS) for one in errors], axis=0)
+    drawn = np.mean([random.choice(sample, DRAWS) for sample in errors], axis=0)
     drawn += error * random.standard_normal(DRAWS)
     low, high = np.quantile(drawn, [outside, 1.0 - outside]).tolist()
     return mean - high, mean - low

@@ -222,7 +222,7 @@ class InternetLoop:
         if not math.isfinite(self.age):
             return ["In one run no command arrived in time, so the delay could not be measured."]
         budgets = [run.budget() for run in self.runs]
-        mean = {name: 1e3 * float(np.mean([one[name] for one in budgets])) for name in budgets[0]}
+        mean = {name: 1e3 * float(np.mean([row[name] for row in budgets])) for name in budgets[0]}
         sentences = [
             f"By measurement, the command in use is {1e3 * self.age:.1f} ms old on average. The "
             f"round trip takes {mean['round trip']:.1f} ms, the controller {mean['held']:.1f} "

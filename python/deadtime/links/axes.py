@@ -135,8 +135,8 @@ class AxisReader:
 
 #: The axes by name: the height, to the north, to the east, and the heading.
 AXES: Mapping[str, Axis] = {
-    one.name: one
-    for one in (
+    axis.name: axis
+    for axis in (
         Axis("z", "height", "climb", "climb_setpoint", "up", "height", absolute=True),
         Axis("x", "north", "north_speed", "north_setpoint", "north", "position to the north"),
         Axis("y", "east", "east_speed", "east_setpoint", "east", "position to the east"),

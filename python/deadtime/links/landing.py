@@ -58,16 +58,16 @@ def run_landing(main: Coroutine[Any, Any, T]) -> T:
             with suppress(OSError):  # standard error may be closed
                 print("deadtime: landing first", file=sys.stderr, flush=True)
 
-        before = {one: signal.getsignal(one) or signal.SIG_DFL for one in _handled_signals()}
-        for one in before:
-            _handle(loop, one, stop)
+        before = {sig: signal.getsignal(sig) or signal.SIG_DFL for sig in _handled_signals()}
+        for sig in before:
+            _handle(loop, sig, stop)
         try:
             return await main
         finally:
-            for one, handler in before.items():
+            for sig, handler in before.items():
                 with suppress(NotImplementedError):
-                    loop.remove_signal_handler(one)
-                signal.signal(one, handler)
+                    loop.remove_signal_handler(sig)
+                signal.signal(sig, handler)
 
     try:
         return asyncio.run(guarded())
@@ -94,18 +94,18 @@ def terminated_like_interrupted() -> Iterator[None]:
         raise KeyboardInterrupt
 
     before = {
-        one: signal.signal(one, interrupt) for one in _handled_signals() if one != signal.SIGINT
+        sig: signal.signal(sig, interrupt) for sig in _handled_signals() if sig != signal.SIGINT
     }
     try:
         yield
     finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
+        for sig, handler in before.items():
+            signal.signal(sig, handler)
 
 
 def _handled_signals() -> list[signal.Signals]:
     """The signals of this system that end a flight, except for ignored ones (as by ``nohup``)."""
     here = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
     return [
-        one for one in here if one == signal.SIGINT or signal.getsignal(one) is not signal.SIG_IGN
+        sig for sig in here if sig == signal.SIGINT or signal.getsignal(sig) is not signal.SIG_IGN
     ]

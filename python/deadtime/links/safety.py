@@ -159,10 +159,10 @@ class Limits:
         commanded = [AXES[name] for name in axes]
         moves = {"up": "climbs and sinks", "turn": "turns", "north": "flies", "east": "flies"}
         rates = {
-            f"{moves[one.command]} at no more than {self.largest(one):g} {one.rate_unit}": None
-            for one in commanded
+            f"{moves[axis.command]} at no more than {self.largest(axis):g} {axis.rate_unit}": None
+            for axis in commanded
         }
-        errors = {f"{self.error_of(one):g} {one.unit}": None for one in commanded}
+        errors = {f"{self.error_of(axis):g} {axis.unit}": None for axis in commanded}
         far = f"{' and '.join(errors)} from the reference"
         if axes != ("z",):
             far += f", and {self.max_distance:g} m from its place of take-off"

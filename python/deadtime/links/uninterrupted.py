@@ -11,9 +11,9 @@ from deadtime._base.errors import LinkError
 
 def note(error: BaseException, *notes: str | None) -> None:
     """Add notes to an error."""
-    for one in notes:
-        if one is not None:
-            error.add_note(one)
+    for text in notes:
+        if text is not None:
+            error.add_note(text)
 
 
 async def uninterrupted(landing: Coroutine[Any, Any, None]) -> None:

@@ -42,10 +42,10 @@ def _inner_loops(contents: LogContents, rate: str) -> list[LoopNames]:
     """Rate and attitude of each axis; the yaw in ATT jumps at north."""
     rates, angles = [], []
     for axis, letter, column in AXES:
-        asked, came = Signal("RATE", (f"{letter}Des",), rate), Signal("RATE", (letter,), rate)
+        asked, measured = Signal("RATE", (f"{letter}Des",), rate), Signal("RATE", (letter,), rate)
         pid = f"PID{letter}"
         setpoint = [asked, Signal(pid, ("Tar",), "rad/s", rule=FILTERED)]
-        response = [came, Signal(pid, ("Act",), "rad/s")]
+        response = [measured, Signal(pid, ("Act",), "rad/s")]
         if _denser(contents, pid, "RATE"):
             setpoint, response = setpoint[::-1], response[::-1]
         rates.append(
@@ -80,23 +80,23 @@ def _horizontal(axis: str, k: int) -> list[LoopNames]:
     """Velocity and position towards north or east, in messages of three generations."""
     letter, old = "NE"[k], "XY"[k]
 
-    def told(name: str, first_name: str, unit: str) -> tuple[Signal, ...]:
+    def signals(name: str, first_name: str, unit: str) -> tuple[Signal, ...]:
         return (
             Signal(f"PSC{letter}", (f"{name}{letter}",), unit),
             Signal("PSC", (f"{name}{old}",), unit),
             Signal("NTUN", (f"{first_name}{old}",), f"c{unit}"),
         )
 
-    asked = told("TV", "DVel", "m/s")
+    asked = signals("TV", "DVel", "m/s")
     return [
         LoopNames(
             f"{axis} velocity", axis, "velocity", asked,
-            response=told("V", "Vel", "m/s"), actuator=told("TA", "DAcc", "m/s/s"),
+            response=signals("V", "Vel", "m/s"), actuator=signals("TA", "DAcc", "m/s/s"),
             conditions=(ARMED, IN_THE_AIR, HELD_PLACE),
         ),
         LoopNames(
-            f"{axis} position", axis, "position", told("TP", "DPos", "m"),
-            response=told("P", "Pos", "m"), actuator=asked,
+            f"{axis} position", axis, "position", signals("TP", "DPos", "m"),
+            response=signals("P", "Pos", "m"), actuator=asked,
             conditions=(ARMED, IN_THE_AIR, HELD_PLACE),
         ),
     ]  # fmt: skip

@@ -119,5 +119,5 @@ def injected(conditions: tuple[Condition, ...]) -> list[LoopNames]:
 
 def _on(numbers: tuple[int, ...]) -> Condition:
     """Where the signal is added to these."""
-    told = state("SIDS", "Ax", lambda axes: np.isin(axes, numbers))
-    return Condition(told, "the test signal is added to another command")
+    windows = state("SIDS", "Ax", lambda axes: np.isin(axes, numbers))
+    return Condition(windows, "the test signal is added to another command")

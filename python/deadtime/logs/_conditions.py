@@ -8,7 +8,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array, Mask
 from deadtime.logs._contents import LogContents
-from deadtime.logs._names import Condition, Told, Windows
+from deadtime.logs._names import Condition, FindWindows, Windows
 from deadtime.logs._series import increasing
 from deadtime.logs._windows import outside, windows_of
 
@@ -17,7 +17,7 @@ from deadtime.logs._windows import outside, windows_of
 NOTICED = 2.5
 
 
-def state(topic: str, column: str, holds: Callable[[Array], Mask]) -> Told:
+def state(topic: str, column: str, holds: Callable[[Array], Mask]) -> FindWindows:
     """Where a logged column passes a test; None if it is not in the log."""
 
     def windows(contents: LogContents) -> Windows | None:
@@ -32,12 +32,12 @@ def state(topic: str, column: str, holds: Callable[[Array], Mask]) -> Told:
     return windows
 
 
-def in_the_air(topic: str, column: str, holds: Callable[[Array], Mask]) -> Told:
+def in_the_air(topic: str, column: str, holds: Callable[[Array], Mask]) -> FindWindows:
     """Where a vehicle says that it flies, without the time in which its landing goes unnoticed."""
-    told = state(topic, column, holds)
+    flights = state(topic, column, holds)
 
     def windows(contents: LogContents) -> Windows | None:
-        found = told(contents)
+        found = flights(contents)
         if found is None:
             return None
         return [(start, stop - NOTICED) for start, stop in found if stop - NOTICED > start]
@@ -45,7 +45,7 @@ def in_the_air(topic: str, column: str, holds: Callable[[Array], Mask]) -> Told:
     return windows
 
 
-def first_told(*ways: Told) -> Told:
+def first_logged(*ways: FindWindows) -> FindWindows:
     """The answer of the first of these that the log tells about."""
 
     def windows(contents: LogContents) -> Windows | None:
@@ -58,7 +58,7 @@ def first_told(*ways: Told) -> Told:
     return windows
 
 
-def in_modes(modes: Collection[str]) -> Told:
+def in_modes(modes: Collection[str]) -> FindWindows:
     """Where one of these flight modes is active; None if the log tells no mode."""
 
     def windows(contents: LogContents) -> Windows | None:
@@ -72,7 +72,7 @@ def in_modes(modes: Collection[str]) -> Told:
     return windows
 
 
-def not_in_modes(modes: Collection[str]) -> Told:
+def not_in_modes(modes: Collection[str]) -> FindWindows:
     """Where none of these flight modes is active; None if the log tells no mode."""
     inside = in_modes(modes)
 
@@ -83,6 +83,6 @@ def not_in_modes(modes: Collection[str]) -> Told:
     return windows
 
 
-def closed_where(told: Told) -> Condition:
+def closed_where(windows: FindWindows) -> Condition:
     """The condition that the flight mode closes a loop."""
-    return Condition(told, "in this flight mode the loop is open")
+    return Condition(windows, "in this flight mode the loop is open")

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from deadtime._base.arrays import Array
-from deadtime.logs._conditions import first_told, state
+from deadtime.logs._conditions import first_logged, state
 from deadtime.logs._contents import LogContents
 from deadtime.logs._names import AutopilotNames, Condition, Kind, LoopNames, Signal
 from deadtime.logs._rotations import heading
@@ -20,7 +20,7 @@ from deadtime.logs._rotations import heading
 #: The event that is logged at a fixed rate.
 TOPIC = "fixedFrequency"
 RUNNING = Condition(
-    first_told(
+    first_logged(
         state(TOPIC, "stabilizer.thrust", lambda values: values > 0),
         state(TOPIC, "motor.m1", lambda values: values > 0),
     ),

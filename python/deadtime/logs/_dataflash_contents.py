@@ -88,7 +88,7 @@ def _modes(messages: Messages, vehicle: str) -> tuple[tuple[float, str], ...]:
     topic = messages.get("MODE")
     if topic is None:
         return ()
-    column = next((one for one in ("ModeNum", "Mode") if one in topic.columns), "")
+    column = next((header for header in ("ModeNum", "Mode") if header in topic.columns), "")
     numbers = messages.texts("MODE", column)
     names = {str(number): name for number, name in MODES.get(vehicle, {}).items()}
     found: list[tuple[float, str]] = []

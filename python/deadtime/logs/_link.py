@@ -76,7 +76,7 @@ class Link:
         """The link in a sentence."""
         above = "above the shortest time" if self.half_round_trip is None else "in total"
         least = self.half_round_trip or 0.0
-        median, late = (stated(least + one, 0.0, "s") for one in (self.median, self.quantile_95))
+        median, late = (stated(least + time, 0.0, "s") for time in (self.median, self.quantile_95))
         lines = (
             f"link to the ground: {self.message} takes {median} {above} (median), 95 % of the "
             f"messages take at most {late}"
@@ -137,7 +137,7 @@ def half_round_trip(
     sent = dict(zip(asked[0].tolist(), asked[1].tolist(), strict=True))
     pairs = zip(answered[0].tolist(), answered[1].tolist(), strict=True)
     trips = [at - sent[number] for number, at in pairs if number in sent]
-    trips = [one for one in trips if one > 0.0]
+    trips = [trip for trip in trips if trip > 0.0]
     return (0.5 * min(trips), len(trips)) if trips else (None, 0)
 
 

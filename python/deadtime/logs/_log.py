@@ -113,8 +113,8 @@ class LogLoop(ReadOnlyArrays):
                 why = "; ".join(self.why_left_out)
                 raise RecordingError(f"{self.name} never follows its setpoint: {why}")
             start, stop = max(self.segments, key=lambda ends: ends[1] - ends[0])
-        told = self.signals[command]
-        return recording_of(self.name, self.setpoint, self.response, told, (start, stop))
+        sent = self.signals[command]
+        return recording_of(self.name, self.setpoint, self.response, sent, (start, stop))
 
     def headline(self) -> str:
         """The loop in one line."""

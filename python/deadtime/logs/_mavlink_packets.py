@@ -110,7 +110,8 @@ class Batch:
         """Rows of each sender."""
         both = self.system.astype(np.int64) << 8 | self.component
         return {
-            (int(one) >> 8, int(one) & 0xFF): np.flatnonzero(both == one) for one in np.unique(both)
+            (int(sender) >> 8, int(sender) & 0xFF): np.flatnonzero(both == sender)
+            for sender in np.unique(both)
         }
 
     def taken(self, rows: Mask) -> Batch:
@@ -157,8 +158,8 @@ def _batch(
             ),
             axis=1,
         )
-        told = whole[:, -2].astype(np.uint16) | whole[:, -1].astype(np.uint16) << 8
-        right[rows] = _checksum(checked) == told
+        stored = whole[:, -2].astype(np.uint16) | whole[:, -1].astype(np.uint16) << 8
+        right[rows] = _checksum(checked) == stored
         used = min(length, size)
         payload[rows, :used] = whole[:, head - 1 : head - 1 + used]
     number, system, component = numbers_and_senders(content, places)

@@ -17,7 +17,7 @@ Kind = Literal["rate", "attitude", "velocity", "position"]
 Windows = list[tuple[float, float]]
 
 #: What finds such windows in a log; None where the log does not tell.
-Told = Callable[[LogContents], Windows | None]
+FindWindows = Callable[[LogContents], Windows | None]
 
 #: Units of logs: the unit here, and the factor to it.
 UNITS: dict[str, tuple[str, float]] = {
@@ -83,7 +83,7 @@ class Condition:
         The state where it does not hold, as ``"the vehicle is disarmed"``.
     """
 
-    windows: Told
+    windows: FindWindows
     otherwise: str
 
 

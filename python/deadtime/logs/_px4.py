@@ -8,7 +8,7 @@ from typing import Any
 from deadtime._base.arrays import Array, Mask
 from deadtime.logs._conditions import (
     closed_where,
-    first_told,
+    first_logged,
     in_modes,
     in_the_air,
     not_in_modes,
@@ -40,7 +40,7 @@ def _is_set(values: Array) -> Mask:
 
 FLYING = (
     Condition(
-        first_told(
+        first_logged(
             state("vehicle_status", "arming_state", lambda values: values == ARMED),
             state("actuator_armed", "armed", _is_set),
         ),
@@ -60,7 +60,7 @@ FLYING = (
 def _closed(flag: str, modes: frozenset[str]) -> tuple[Condition, ...]:
     """Conditions of a loop that some modes close: the flag of the version, else the mode."""
     flagged = state("vehicle_control_mode", f"flag_control_{flag}_enabled", _is_set)
-    return (*FLYING, closed_where(first_told(flagged, in_modes(modes))))
+    return (*FLYING, closed_where(first_logged(flagged, in_modes(modes))))
 
 
 def _rate(axis: str, k: int) -> LoopNames:
@@ -102,7 +102,7 @@ def _attitude(axis: str) -> LoopNames:
             Signal("vehicle_attitude", (axis,), "rad", **turns),
         ),
         actuator=(Signal("vehicle_rates_setpoint", (axis,), "rad/s"),),
-        conditions=(*FLYING, closed_where(first_told(flagged, not_in_modes({"Acro"})))),
+        conditions=(*FLYING, closed_where(first_logged(flagged, not_in_modes({"Acro"})))),
     )
 
 
@@ -172,7 +172,7 @@ def names(contents: LogContents) -> AutopilotNames:
         return NAMES
     # The board is turned in the vehicle, and a gyroscope on it measures other axes.
     loops = (
-        replace(loop, response=tuple(one for one in loop.response if one.topic != GYRO))
+        replace(loop, response=tuple(signal for signal in loop.response if signal.topic != GYRO))
         for loop in NAMES.loops
     )
     return replace(NAMES, loops=tuple(loops))

@@ -17,7 +17,7 @@ def recording_of(
     name: str,
     setpoint: Series | None,
     response: Series,
-    told: Series,
+    command: Series,
     part: tuple[float | None, float | None],
 ) -> Recording:
     """The response of a loop, and what it is told, over a part of the log.
@@ -27,13 +27,13 @@ def recording_of(
     start, stop = part
     low = -np.inf if start is None else start
     high = np.inf if stop is None else stop
-    sent, values = _commands_of(told, high)
+    sent, values = _commands_of(command, high)
     low = max(low, float(sent[0])) if sent.size else np.inf
     time, output = response.time, response.values
     rows = (time >= low) & (time <= high) & np.isfinite(output)
     if not rows.any():
         raise RecordingError(
-            f"from {low:g} to {high:g} s, {name} has no rows in which it follows {told.source}"
+            f"from {low:g} to {high:g} s, {name} has no rows in which it follows {command.source}"
         )
     time, output = time[rows], output[rows]
     fresh = np.ones(time.size, dtype=bool)
@@ -41,7 +41,7 @@ def recording_of(
     time, output = time[fresh], output[fresh]
     kept = sent >= time[0] - EARLIER * (time[-1] - time[0])
     kept |= sent >= sent[np.searchsorted(sent, time[0], side="right") - 1]
-    units = {"output": response.unit, "command": told.unit}
+    units = {"output": response.unit, "command": command.unit}
     if setpoint is not None:
         units["reference"] = setpoint.unit
     return Recording(
@@ -49,15 +49,15 @@ def recording_of(
         None if setpoint is None else _held(setpoint, time),
         output,
         units={signal: unit for signal, unit in units.items() if unit},
-        source=f"{name}, {told.source} to {response.source}",
+        source=f"{name}, {command.source} to {response.source}",
         sent=(sent[kept], values[kept]),
     )
 
 
-def _commands_of(told: Series, stop: float) -> tuple[Array, Array]:
+def _commands_of(command: Series, stop: float) -> tuple[Array, Array]:
     """Times and values of the commands up to `stop` and of the next one, all that are a number."""
-    known = np.isfinite(told.values)
-    time, values = told.time[known], told.values[known]
+    known = np.isfinite(command.values)
+    time, values = command.time[known], command.values[known]
     kept = int(np.searchsorted(time, stop, side="right")) + 1
     return time[:kept], values[:kept]
 

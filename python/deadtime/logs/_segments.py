@@ -46,7 +46,7 @@ def segments_of(
     kept = _cut(kept, outside(lost), "the logger lost data", reasons)
     copies = outside(_copies(setpoint, response))
     kept = _cut(kept, copies, "the setpoint is only a copy of the estimate", reasons)
-    long = [one for one in kept if all(_rows(s, one) >= FEWEST for s in (setpoint, response))]
+    long = [span for span in kept if all(_rows(s, span) >= FEWEST for s in (setpoint, response))]
     kept = _cut(kept, long, f"a window contains fewer than {FEWEST} rows", reasons)
     return tuple(kept), tuple(reasons)
 

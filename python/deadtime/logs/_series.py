@@ -91,8 +91,8 @@ def _series(signal: Signal, topic: Topic, start: float) -> tuple[Series, int]:
     with np.errstate(all="ignore"):  # damaged logs hold any number
         columns = [np.asarray(topic.columns[name], dtype=float) for name in signal.columns]
         values = columns[0] if signal.derive is None else signal.derive(*columns)
-        told = topic.units.get(signal.columns[0], "") if signal.derive is None else ""
-        logged = told if told in UNITS else signal.unit
+        label = topic.units.get(signal.columns[0], "") if signal.derive is None else ""
+        logged = label if label in UNITS else signal.unit
         unit, factor = UNITS.get(logged, (logged, 1.0))
         values = np.asarray(values * (factor * signal.sign), dtype=float)
     values[~np.isfinite(values)] = np.nan

@@ -90,7 +90,7 @@ def read_tlog(data: bytes, source: str) -> LogContents:
         remarks.append("the file ends within a packet, so it was cut off")
     if damaged:
         remarks.append(f"{damaged} packets with a wrong checksum are left out")
-    found, clock = _one_session(found, vehicle, remarks, source)
+    found, clock = _longest_without_restart(found, vehicle, remarks, source)
     topics = _topics(found, vehicle, clock)
     autopilot = AUTOPILOTS.get(pilot, "")
     return LogContents(
@@ -124,7 +124,7 @@ def _vehicle(found: list[Batch]) -> Sender | None:
     return max(counts, key=lambda sender: counts[sender]) if counts else None
 
 
-def _one_session(
+def _longest_without_restart(
     found: list[Batch], vehicle: Sender, remarks: list[str], source: str
 ) -> tuple[list[Batch], Clock]:
     """The messages of the longest time without a restart, and its pairs of both clocks.
@@ -186,15 +186,15 @@ def _link(
     data: bytes, packets: Packets, found: list[Batch], vehicle: Sender, known: Collection[int]
 ) -> Link | None:
     """The way of the vehicle's messages to the ground station; None where the log does not tell."""
-    told = []
+    candidates = []
     for batch in found:
         rows, time = batch.senders().get(vehicle), _vehicle_time(batch, BOOT)
         if rows is not None and time is not None:
             rows = rows[np.isfinite(time[rows])]
-            told.append((rows.size, batch.name, time[rows], batch.ground[rows]))
-    if not told:
+            candidates.append((rows.size, batch.name, time[rows], batch.ground[rows]))
+    if not candidates:
         return None
-    count, name, sent, received = max(told, key=lambda one: one[:2])
+    count, name, sent, received = max(candidates, key=lambda candidate: candidate[:2])
     way = transport_of(sent, received)
     if way is None:
         return None
@@ -240,7 +240,7 @@ def _topics(found: list[Batch], vehicle: Sender, clock: Clock) -> dict[str, Topi
     topics = {}
     for batch in found:
         senders = batch.senders()
-        main = vehicle if vehicle in senders else max(senders, key=lambda one: senders[one].size)
+        main = vehicle if vehicle in senders else max(senders, key=lambda node: senders[node].size)
         for sender, rows in senders.items():
             name = batch.name if sender == main else f"{batch.name}[{sender[0]}/{sender[1]}]"
             topics[name] = _topic(batch, rows, sender == vehicle, clock)

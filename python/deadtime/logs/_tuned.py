@@ -84,16 +84,18 @@ def tune_loop(
     if loop is not None:
         return _tuned(log, log.loop(loop), firmware, controller, form, allow_indication, demands)
     refused = []
-    known = [one for one in log.loops.values() if one.name in LOOPS_OF_FORMS[firmware]]
-    for one in sorted(known, key=lambda each: ORDER.index(each.kind)):
+    known = [
+        log_loop for log_loop in log.loops.values() if log_loop.name in LOOPS_OF_FORMS[firmware]
+    ]
+    for log_loop in sorted(known, key=lambda each: ORDER.index(each.kind)):
         try:
-            found = _tuned(log, one, firmware, controller, form, allow_indication, demands)
+            found = _tuned(log, log_loop, firmware, controller, form, allow_indication, demands)
         except (ValueError, NotIdentifiableError) as error:
-            refused.append(f"{one.name}: {str(error).removeprefix(f'{one.name}: ')}")
+            refused.append(f"{log_loop.name}: {str(error).removeprefix(f'{log_loop.name}: ')}")
             continue
         if found.verdict != "none":
             return found
-        refused.append(f"{one.name}: {'; '.join(found.reasons)}")
+        refused.append(f"{log_loop.name}: {'; '.join(found.reasons)}")
     why = "; ".join(refused) or (
         f"the log has none of the loops {', '.join(LOOPS_OF_FORMS[firmware])}"
     )

@@ -71,8 +71,8 @@ def read_ulog(data: bytes, source: str) -> LogContents:
         remarks=_remarks(log),
         span=span if 0.0 < span[1] - span[0] < DAY else None,
         gaps=tuple(
-            (one.timestamp * MICROSECOND, one.timestamp * MICROSECOND + 1e-3 * one.duration)
-            for one in log.dropouts
+            (gap.timestamp * MICROSECOND, gap.timestamp * MICROSECOND + 1e-3 * gap.duration)
+            for gap in log.dropouts
         ),
     )
 
@@ -140,6 +140,6 @@ def _remarks(log: Any) -> tuple[str, ...]:
     if log.file_corruption:
         remarks.append("the file is damaged, so parts that cannot be read are left out")
     if log.dropouts:
-        lost = 1e-3 * sum(one.duration for one in log.dropouts)
+        lost = 1e-3 * sum(gap.duration for gap in log.dropouts)
         remarks.append(f"the logger lost data {len(log.dropouts)} times, for {lost:.3g} s in total")
     return tuple(remarks)

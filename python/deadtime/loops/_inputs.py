@@ -260,8 +260,8 @@ def _fitted(name: str, function: Callable[[Any], Any], times: Array) -> _Pieces:
         within = (times > low[piece]) & (times < high[piece])
         piece = piece[within]
         there = chebyshev.chebvander((times[within] - middle[piece]) / half[piece], _DEGREE)
-        apart = np.abs((there * series[piece]).sum(axis=1) - shown[within])
-        np.maximum.at(error, piece, apart)
+        deviation = np.abs((there * series[piece]).sum(axis=1) - shown[within])
+        np.maximum.at(error, piece, deviation)
         # Rounding of the time moves a function as far as its slope says.
         slope = np.abs(series) @ powers**2 / half
         late = np.maximum(np.abs(low), np.abs(high))

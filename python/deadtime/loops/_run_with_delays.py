@@ -106,7 +106,7 @@ def _together(
         inputs=np.sum([run.outputs for run in inputs], axis=0),
         breaks=np.unique(np.concatenate([run.breaks for run in (*outputs, *inputs)])),
         reference=reference,
-        _dense=lambda when: np.sum([one(when) for one in dense], axis=0),
+        _dense=lambda when: np.sum([solution(when) for solution in dense], axis=0),
     )
 
 

@@ -176,7 +176,7 @@ class LoopSpecification(PickledByFields):
         """The loops of the kernel with other numbers."""
         numbers = self.plant.parameters
         given = self.plant._given(numbers)
-        each = [given and self.plant._given({**numbers, **one}) for one in sets]
+        each = [given and self.plant._given({**numbers, **values}) for values in sets]
         return self.kernel.at_each([*map(dict, sets)], each)
 
     def outputs_at(

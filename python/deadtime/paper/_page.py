@@ -72,13 +72,13 @@ def render_reproduction(found: Reproduction, figures: dict[str, Figure] | None =
         heads=HEADS,
         rows={name: list(map(_row, part.comparisons)) for name, part in parts.items()},
         kinds={
-            name: [CLASSES[one.verdict] for one in part.comparisons] for name, part in parts.items()
+            name: [CLASSES[row.verdict] for row in part.comparisons] for name, part in parts.items()
         },
         explorer=LOOP.explore(RANGES),
     )
 
 
-def _row(one: Comparison) -> tuple[str, ...]:
+def _row(result: Comparison) -> tuple[str, ...]:
     """A row of the table."""
-    why = "; ".join(words for words in (one.model, one.note) if words)
-    return (one.where, one.quantity, one.printed, one.shown, one.outcome, why)
+    why = "; ".join(words for words in (result.model, result.note) if words)
+    return (result.where, result.quantity, result.printed, result.shown, result.outcome, why)

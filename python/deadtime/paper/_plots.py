@@ -66,7 +66,7 @@ def _table1(part: Table1) -> Figure:
     """Delays over the gain, by the dominant root and exactly."""
     figure, ax = new_figure(6.0, 3.6)
     gains = [row.gain for row in part.rows]
-    printed = [float(one.printed) for one in part.comparisons if one.quantity.endswith("Td (s)")]
+    printed = [float(row.printed) for row in part.comparisons if row.quantity.endswith("Td (s)")]
     ax.plot(gains, printed, label="printed", **PRINTED)
     ax.plot(gains, [row.delay for row in part.rows], color=COLOURS[0], label="dominant root")
     ax.plot(gains, [row.exact_delay for row in part.rows], color=COLOURS[1], label="exact")
@@ -81,16 +81,16 @@ def _figure2(part: Figure2) -> Figure:
     colours = _colours(len(part.simulated))
     for (gain, response), colour in zip(part.simulated.items(), colours, strict=True):
         left.plot(response.time, response.outputs, color=colour, label=f"K = {gain:g}", **THIN)
-        (trial,) = (one for one in part.trials if one.gain == gain and one.scenario.jitter)
+        (trial,) = (case for case in part.trials if case.gain == gain and case.scenario.jitter)
         left.plot(trial.recording.time, trial.recording.output, color=colour, lw=0.7, ls="--")
     left.set_xlim(-0.1, 2.0)
     _step_axes(left, "Td = 0.1 s; dashed: network with jitter")
     for kind, colour in (("lag", COLOURS[1]), ("hold", COLOURS[0])):
         for ratio, style in (("period", {"marker": "o"}), ("peak", {"marker": "x", "ls": ":"})):
-            shown = [(getattr(one, kind), one) for one in part.stretches if getattr(one, kind)]
+            shown = [(getattr(case, kind), case) for case in part.stretches if getattr(case, kind)]
             middle.plot(
                 [1e3 * value for value, _ in shown],
-                [getattr(one, f"{ratio}_ratio") for _, one in shown],
+                [getattr(case, f"{ratio}_ratio") for _, case in shown],
                 color=colour,
                 label=f"{'first peak' if ratio == 'peak' else 'period'}, {kind}",
                 **({"ls": "", "ms": 4} | {"marker": style["marker"]}),
@@ -117,7 +117,7 @@ def _figure2(part: Figure2) -> Figure:
 def _figure3(part: Figure3) -> Figure:
     """Responses near the limit, the rightmost root, and the limit of coarse simulations."""
     figure, (left, middle, right) = new_figure(12.0, 4.0, columns=3)
-    shown = [(f"K = {gain:g}", one) for gain, one in part.responses.items() if gain < 18.0]
+    shown = [(f"K = {gain:g}", curve) for gain, curve in part.responses.items() if gain < 18.0]
     _responses(left, shown, COLOURS)
     left.set_ylim(-2.0, 4.0)
     _step_axes(left, "Exact responses")
@@ -183,15 +183,15 @@ def _figure6(part: Figure6) -> Figure:
     """Responses of Table 2 and their peaks."""
     figure, (left, right) = new_figure(10.0, 4.0, columns=2)
     colours = _colours(len(part.exact))
-    labels = [(f"N = {samples:g}", one) for samples, one in part.exact.items()]
+    labels = [(f"N = {samples:g}", curve) for samples, curve in part.exact.items()]
     for ax in (left, right):
         _responses(ax, labels, colours)
     right.set_prop_cycle(None)
-    for (samples, one), colour in zip(part.coarse.items(), colours, strict=True):
+    for (samples, response), colour in zip(part.coarse.items(), colours, strict=True):
         # The coarse model steps half a second later.
-        late = float(one.breaks[0])
+        late = float(response.breaks[0])
         label = "coarse steps" if samples == next(iter(part.coarse)) else None
-        right.plot(one.time - late, one.outputs, ".", color=colour, ms=3, label=label)
+        right.plot(response.time - late, response.outputs, ".", color=colour, ms=3, label=label)
     left.set_xlim(0.0, 5.0)
     _step_axes(left, "Exact", " / m")
     _step_axes(right, "The peaks", " / m")
@@ -212,9 +212,9 @@ def _figure7(part: Figure7) -> Figure:
         ("dominant", "dominant root", "s", COLOURS[0]),
         ("linear", "exact, no limit", "x", COLOURS[2]),
     ):
-        delays = [getattr(one, name) for one in part.flights]
+        delays = [getattr(flight, name) for flight in part.flights]
         right.plot(flights, delays, marker, color=colour, label=label, ms=6)
-    right.set_xticks(flights, [f"{one.overshoot:g} %" for one in part.flights])
+    right.set_xticks(flights, [f"{flight.overshoot:g} %" for flight in part.flights])
     _legend(
         right,
         "Delay from the overshoot of each flight",
@@ -228,7 +228,7 @@ def _figure7(part: Figure7) -> Figure:
 def _figure8(part: Figure8) -> Figure:
     """Responses at Kp = 4 and 5."""
     figure, ax = new_figure(6.5, 3.8)
-    _responses(ax, [(f"Kp = {gain:g}", one) for gain, one in part.responses.items()], COLOURS)
+    _responses(ax, [(f"Kp = {gain:g}", curve) for gain, curve in part.responses.items()], COLOURS)
     ax.set_ylim(-4.0, 6.0)
     _step_axes(ax, f"Td = 0.36 s, stable up to Kp = {part.limit:.3f}", " / m")
     return figure
@@ -291,15 +291,15 @@ def _figure10(part: Figure10) -> Figure:
 def _figure11(part: Figure11) -> Figure:
     """Responses of the model of the flights, with their settling times."""
     figure, (left, right) = new_figure(10.0, 3.8, columns=2)
-    labels = [(f"Kv = {gain:g}", one) for gain, one in part.responses.items()]
+    labels = [(f"Kv = {gain:g}", curve) for gain, curve in part.responses.items()]
     for ax in (left, right):
         _responses(ax, labels, COLOURS)
         ax.axhspan(0.98, 1.02, color="0.9", zorder=0, label="± 2 %")
     _responses(left, [("Kv = 0.3, without the limit", part.unlimited)], COLOURS[2:], ls="--")
     left.set_xlim(0.0, 6.0)
     _step_axes(left, "Model of the flights", " / m")
-    for one, colour in zip(part.settling, COLOURS, strict=False):
-        right.axvline(one.from_step, color=colour, lw=1.0, ls=":")
+    for settling, colour in zip(part.settling, COLOURS, strict=False):
+        right.axvline(settling.from_step, color=colour, lw=1.0, ls=":")
     _step_axes(right, "Where they settle", " / m")
     right.set(xlim=(1.0, 6.0), ylim=(0.93, 1.03))
     return figure

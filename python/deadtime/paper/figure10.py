@@ -108,8 +108,10 @@ class Figure10(Part):
             (f"Kv = {gain:g}", *(_in_words(curve.roots[float(gain)]) for curve in curves))
             for gain in GRID
         ]
-        rows.append(("best", *(f"Kv = {one.best:.4f}: {one.best_abscissa:.4f}" for one in curves)))
-        rows.append(("unstable above", *(f"Kv = {one.critical:.4f}" for one in curves)))
+        rows.append(
+            ("best", *(f"Kv = {curve.best:.4f}: {curve.best_abscissa:.4f}" for curve in curves))
+        )
+        rows.append(("unstable above", *(f"Kv = {curve.critical:.4f}" for curve in curves)))
         return (
             Grid(
                 "Rightmost root (1/s), Kp = 2, Td = 0.36 s",
@@ -149,7 +151,7 @@ def figure10() -> Figure10:
     >>> print(f"{found.filtered.best:.3f} {found.filtered.best_abscissa:.3f}")
     0.190 -2.645
     """
-    ideal, filtered = (_curve(velocity_loop(0.3, one)) for one in (False, True))
+    ideal, filtered = (_curve(velocity_loop(0.3, with_filter)) for with_filter in (False, True))
     complex_above = _turns_complex()
     comparisons = _compared(ideal, filtered, complex_above)
     return Figure10(ideal, filtered, DELAY, complex_above, comparisons=comparisons)

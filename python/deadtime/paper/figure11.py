@@ -88,13 +88,13 @@ class Figure11(Part):
                 ("Kv", "printed", "from the step", "from motion", "to 2.1 %"),
                 tuple(
                     (
-                        f"{one.gain:g}",
-                        PRINTED[one.gain],
-                        f"{one.from_step:.3f}",
-                        f"{one.from_motion:.3f}",
-                        f"{one.wider:.3f}",
+                        f"{settling.gain:g}",
+                        PRINTED[settling.gain],
+                        f"{settling.from_step:.3f}",
+                        f"{settling.from_motion:.3f}",
+                        f"{settling.wider:.3f}",
                     )
-                    for one in self.settling
+                    for settling in self.settling
                 ),
             ),
             Grid(
@@ -126,8 +126,8 @@ def figure11() -> Figure11:
     Examples
     --------
     >>> from deadtime import paper
-    >>> for one in paper.figure11().settling:
-    ...     print(f"{one.gain:g} {one.from_motion:.3f} {one.wider:.3f}")
+    >>> for settling in paper.figure11().settling:
+    ...     print(f"{settling.gain:g} {settling.from_motion:.3f} {settling.wider:.3f}")
     0.3 1.739 1.719
     0.7 3.070 2.459
     """
@@ -216,15 +216,15 @@ def _compared(
         *(
             Comparison.of_measurement(
                 "Fig 11",
-                f"ts Kv={one.gain:g}",
-                PRINTED[one.gain],
-                one.from_motion,
+                f"ts Kv={row.gain:g}",
+                PRINTED[row.gain],
+                row.from_motion,
                 model,
-                note=f"{one.from_step:.3f} s after the step; {one.wider:.3f} s to 2.1 % instead "
+                note=f"{row.from_step:.3f} s after the step; {row.wider:.3f} s to 2.1 % instead "
                 "of 2 %",
-                from_step=one.from_step,
-                wider=one.wider,
+                from_step=row.from_step,
+                wider=row.wider,
             )
-            for one in settling
+            for row in settling
         ),
     )

@@ -113,7 +113,7 @@ class Figure2(Part):
             cells = [f"{gain:g}"]
             for scenario in SCENARIOS:
                 (trial,) = (
-                    one for one in self.trials if one.gain == gain and one.scenario == scenario
+                    case for case in self.trials if case.gain == gain and case.scenario == scenario
                 )
                 cells.append(_in_ms(trial.delays))
             rows.append(tuple(cells))
@@ -127,14 +127,14 @@ class Figure2(Part):
         kinds = [(hold, 0.0) for hold in HOLDS] + [(0.0, lag) for lag in LAGS]
         rows = []
         for hold, lag in kinds:
-            found = [one for one in self.stretches if (one.hold, one.lag) == (hold, lag)]
+            found = [case for case in self.stretches if (case.hold, case.lag) == (hold, lag)]
             rows.append(
                 (
                     f"hold {1e3 * hold:g} ms" if hold else f"lag {1e3 * lag:g} ms",
-                    _span(one.period_ratio for one in found),
-                    _span(one.peak_ratio for one in found),
-                    _span((one.delay for one in found), " s"),
-                    ", ".join(f"{one.gain:g}" for one in found),
+                    _span(case.period_ratio for case in found),
+                    _span(case.peak_ratio for case in found),
+                    _span((case.delay for case in found), " s"),
+                    ", ".join(f"{case.gain:g}" for case in found),
                 )
             )
         return Grid(
@@ -166,7 +166,7 @@ class Figure2(Part):
     def findings(self) -> tuple[str, ...]:
         """The answer to the question of Figure 2, and its limits."""
         hold, lag, both = self.explanations
-        held = [one.period_ratio for one in (*self.stretches, *self.fitted) if one.hold > 0.0]
+        held = [case.period_ratio for case in (*self.stretches, *self.fitted) if case.hold > 0.0]
         return (
             "With a delay alone, K and the overshoot determine the period. So another period "
             "at the same K and overshoot proves a second time constant in the loop.",
@@ -178,7 +178,7 @@ class Figure2(Part):
             f"leaves an error of {hold.misfits[0]:.1f} points. A hold of "
             f"{1e3 * hold.values[hold.best]:.0f} ms with a delay of "
             f"{1e3 * hold.delays[hold.best]:.0f} ms leaves {hold.misfits[hold.best]:.1f} "
-            f"points, with a period {_span(one.period_ratio for one in self.fitted)} times as "
+            f"points, with a period {_span(fit.period_ratio for fit in self.fitted)} times as "
             f"long. Every lag increases the error, to {lag.misfits[-1]:.1f} points at "
             f"{1e3 * lag.values[-1]:.0f} ms. With that hold, a lag also increases the error "
             f"({both.misfits[-1]:.1f} points at {1e3 * both.values[-1]:.0f} ms). The minimum "
@@ -198,10 +198,12 @@ class Figure2(Part):
         )
 
     def _periods(self, hold: float = 0.0, lag: float = 0.0) -> list[float]:
-        return [one.period_ratio for one in self.stretches if (one.hold, one.lag) == (hold, lag)]
+        return [
+            case.period_ratio for case in self.stretches if (case.hold, case.lag) == (hold, lag)
+        ]
 
     def _means(self, scenario: Scenario) -> list[float]:
-        return [float(one.delays.mean()) for one in self.trials if one.scenario == scenario]
+        return [float(case.delays.mean()) for case in self.trials if case.scenario == scenario]
 
     def _rise(self) -> float:
         """Estimate at the largest gain minus that at the smallest, s."""
@@ -247,7 +249,7 @@ def figure2() -> Figure2:
     return Figure2(
         simulated={gain: loop.replace(Kp=gain).simulate(time) for gain in gains},
         trials=tuple(_trial(gain, scenario) for scenario in SCENARIOS for gain in gains),
-        stretches=tuple(one for one in stretches if one is not None),
+        stretches=tuple(case for case in stretches if case is not None),
         explanations=explanations,
         fitted=tuple(time_scale(best.replace(Kp=gain)) for gain in gains),
     )
@@ -266,7 +268,7 @@ def _trial(gain: float, scenario: Scenario) -> Trial:
         )
         for seed in range(SEEDS if scenario.jitter else 1)
     ]
-    delays = [dtm.estimate_delay(one, known, method="overshoot").delay for one in recordings]
+    delays = [dtm.estimate_delay(record, known, method="overshoot").delay for record in recordings]
     return Trial(gain, scenario, recordings[0], np.array(delays))
 
 

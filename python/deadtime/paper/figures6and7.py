@@ -124,19 +124,19 @@ class Figure7(Part):
                 ("overshoot", "dominant root", "exact, no limit", "exact, limit 1 m/s"),
                 tuple(
                     (
-                        f"{one.overshoot:g} %",
-                        f"{one.dominant:.4f} s",
-                        f"{one.linear:.4f} s",
-                        f"{one.saturated:.4f} s",
+                        f"{flight.overshoot:g} %",
+                        f"{flight.dominant:.4f} s",
+                        f"{flight.linear:.4f} s",
+                        f"{flight.saturated:.4f} s",
                     )
-                    for one in self.flights
+                    for flight in self.flights
                 ),
             ),
         )
 
     def findings(self) -> tuple[str, ...]:
         """What the flights show."""
-        delays = [one.saturated for one in self.flights]
+        delays = [flight.saturated for flight in self.flights]
         spread = 100.0 * (max(delays) - min(delays)) / max(delays)
         four = 100.0 * (max(delays[:4]) - min(delays[:4])) / max(delays[:4])
         return (

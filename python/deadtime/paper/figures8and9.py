@@ -127,7 +127,7 @@ def figure9() -> Figure9:
     Examples
     --------
     >>> from deadtime import paper
-    >>> [one.shown for one in paper.figure9().comparisons]
+    >>> [row.shown for row in paper.figure9().comparisons]
     ['-0.1715 ± 4.2513i', '0.2700 ± 4.5288i']
     """
     compared = []

@@ -58,7 +58,7 @@ class Reproduction:
     @property
     def comparisons(self) -> tuple[Comparison, ...]:
         """Every printed number beside the computed one, in the order of the paper."""
-        return tuple(one for part in self.parts.values() for one in part.comparisons)
+        return tuple(comparison for part in self.parts.values() for comparison in part.comparisons)
 
     def counts(self) -> dict[Verdict, int]:
         """Number of each verdict.
@@ -67,7 +67,7 @@ class Reproduction:
         -------
         dict of Verdict to int
         """
-        given = Counter(one.verdict for one in self.comparisons)
+        given = Counter(comparison.verdict for comparison in self.comparisons)
         return {verdict: given[verdict] for verdict in Verdict}
 
     def summary(self) -> str:
@@ -81,9 +81,9 @@ class Reproduction:
         numbers = (Verdict.EXACT, Verdict.PARTLY, Verdict.DIFFERENT)
         statements = (Verdict.CONFIRMED, Verdict.CONTRADICTED)
         return (
-            f"{sum(counts[one] for one in numbers)} printed numbers: {counts[Verdict.EXACT]} "
+            f"{sum(counts[kind] for kind in numbers)} printed numbers: {counts[Verdict.EXACT]} "
             f"reproduced to every digit, {counts[Verdict.PARTLY]} to fewer digits, "
-            f"{counts[Verdict.DIFFERENT]} not. {sum(counts[one] for one in statements)} "
+            f"{counts[Verdict.DIFFERENT]} not. {sum(counts[kind] for kind in statements)} "
             f"statements: {counts[Verdict.CONFIRMED]} were confirmed, "
             f"{counts[Verdict.CONTRADICTED]} not supported. {counts[Verdict.MEASURED]} "
             "measurements cannot be compared."
@@ -102,7 +102,7 @@ class Reproduction:
             "parts": {
                 name: {
                     "title": TITLES[name],
-                    "comparisons": [one.to_dict() for one in part.comparisons],
+                    "comparisons": [comparison.to_dict() for comparison in part.comparisons],
                     "tables": [
                         {"title": grid.title, "heads": grid.heads, "rows": grid.rows}
                         for grid in part.grids()

@@ -132,7 +132,7 @@ class RecordingCheck(ReadOnlyArrays):
     def to_dict(self) -> dict[str, Any]:
         """All that was found, as plain values for JSON."""
         found = {**self._shown(), "refused": self.refused}
-        found["findings"] = [plain_fields(asdict(one)) for one in self.findings]
+        found["findings"] = [plain_fields(asdict(finding)) for finding in self.findings]
         found["holes"] = [hole._asdict() for hole in self.holes]
         found["repeated"] = self.repeated.tolist()
         return found

@@ -95,7 +95,7 @@ def _unit(
     own = _own_time(loop)
     slow_log = own is not None and row_time < own
     slow_controller = columns.time[-1] - columns.time[0] > SAMPLES * sample_time
-    apart = (
+    words = (
         f"the rows are {row_time:g} apart in the unit of the time stamps, but sample_time is "
         f"{sample_time:g} s"
     )
@@ -104,7 +104,7 @@ def _unit(
             return Finding(
                 "time_unit",
                 "refused",
-                f"{apart}, a factor of {factor:.0f}. The time stamps are probably {unit}: "
+                f"{words}, a factor of {factor:.0f}. The time stamps are probably {unit}: "
                 f"divide the time stamps by {factor:.0f}",
                 f"delays would be {factor:.0f} times too long, and gains too small by the "
                 "same factor",
@@ -113,7 +113,7 @@ def _unit(
             return Finding(
                 "time_unit",
                 "refused",
-                f"{apart}, a factor of {factor:.0f}. Either sample_time is in {unit}, or the "
+                f"{words}, a factor of {factor:.0f}. Either sample_time is in {unit}, or the "
                 f"time stamps were divided by {factor:.0f} without need: give both in seconds",
                 f"delays would be up to {factor:.0f} times too short",
             )
@@ -157,10 +157,10 @@ def _other_spacing(
     if columns.sent is not None:
         soon = _hasty(columns.sent, sample_time)
         if soon > HASTE_SENT:
-            told = f"commands have times of their own, and sample_time is {seconds(sample_time)}"
-            yield _no_such_hold(told, soon, sample_time)
+            reason = f"commands have times of their own, and sample_time is {seconds(sample_time)}"
+            yield _no_such_hold(reason, soon, sample_time)
         return
-    apart = (
+    words = (
         f"the rows are {seconds(rows.mean_time)} apart, but sample_time is {seconds(sample_time)}"
     )
     shift = f"the delay is uncertain by up to half a sample time, {seconds(0.5 * sample_time)}"
@@ -168,7 +168,7 @@ def _other_spacing(
         yield Finding(
             "sample_time",
             "refused",
-            f"{apart}, but the command changes on each row: give sample_time={rows.mean_time:.6g}",
+            f"{words}, but the command changes on each row: give sample_time={rows.mean_time:.6g}",
             "a wrong hold changes the estimated delay by half the difference, "
             f"{seconds(0.5 * abs(rows.mean_time - sample_time))}",
         )
@@ -176,7 +176,7 @@ def _other_spacing(
         yield Finding(
             "other_rate",
             "warning",
-            f"{apart}. So the rows are not the samples of the controller, and commands between "
+            f"{words}. So the rows are not the samples of the controller, and commands between "
             "rows are missing. Log at the rate of the controller",
             f"{shift} and by half a row, {seconds(0.5 * rows.mean_time)}",
             0.5 * (sample_time + rows.mean_time),
@@ -185,7 +185,7 @@ def _other_spacing(
         yield Finding(
             "other_rate",
             "warning",
-            f"{apart}. So the rows are not the samples of the controller, and the times at "
+            f"{words}. So the rows are not the samples of the controller, and the times at "
             "which the command changes are not known. Log the command",
             shift,
             0.5 * sample_time,
@@ -193,12 +193,12 @@ def _other_spacing(
     else:
         soon = _hasty(columns.time[1:][np.diff(columns.command) != 0.0], sample_time)
         if soon > HASTE:
-            yield _no_such_hold(apart, soon, sample_time)
+            yield _no_such_hold(words, soon, sample_time)
         else:
             yield Finding(
                 "other_rate",
                 "note",
-                f"{apart}. The command stays constant over several rows, so the controller "
+                f"{words}. The command stays constant over several rows, so the controller "
                 "samples at the rows where it changes",
                 "none, if a fit uses the times at which the command changes",
             )
@@ -209,11 +209,11 @@ def _hasty(changes: Array, sample_time: float) -> float:
     return float(np.mean(np.diff(changes) < 0.75 * sample_time)) if changes.size > 1 else 0.0
 
 
-def _no_such_hold(told: str, soon: float, sample_time: float) -> Finding:
+def _no_such_hold(reason: str, soon: float, sample_time: float) -> Finding:
     return Finding(
         "sample_time",
         "refused",
-        f"{told}, but {100.0 * soon:.0f} % of the changes of the command follow the previous "
+        f"{reason}, but {100.0 * soon:.0f} % of the changes of the command follow the previous "
         "change after a shorter time. Check sample_time, or leave sample_time out",
         "the model would contain a hold that the loop does not have, which acts like "
         f"{seconds(0.5 * sample_time)} of delay",

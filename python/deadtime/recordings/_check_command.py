@@ -128,7 +128,7 @@ def _law_to_rounding(
     agree = [np.abs(u[inner] - clipped[inner - late]) <= tolerance for _, late in LAWS]
     if np.count_nonzero(moving) < FEWEST:
         return ("unknown" if np.mean(np.abs(u - clipped) <= tolerance) > AGREE else None), 0
-    shares = [float(np.mean(one[moving])) for one in agree]
+    shares = [float(np.mean(agrees[moving])) for agrees in agree]
     best = int(np.argmax(shares))
     if float(np.mean(agree[best])) < AGREE or shares[best] < AGREE:
         return None, 0
@@ -312,11 +312,11 @@ def _limit_findings(columns: Columns, command: Command, loop: ControlLoop) -> It
             "delay would be too short",
         )
     elif seen is not None and (loop.limit is None or seen < (1.0 - 1e-3) * loop.limit - step):
-        told = "no limit was given" if loop.limit is None else f"limit={loop.limit:g} was given"
+        note = "no limit was given" if loop.limit is None else f"limit={loop.limit:g} was given"
         yield Finding(
             "limit_seen",
             "warning" if loop.limit is None else "refused",
             f"the command stops at {seen:.6g}, although the controller demands more, and "
-            f"{told}: give limit={seen:.6g}",
+            f"{note}: give limit={seen:.6g}",
             "a fit of the loop would attribute the slower response to the delay",
         )

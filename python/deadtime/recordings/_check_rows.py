@@ -129,22 +129,22 @@ def _repeated(columns: Columns) -> tuple[NDArray[np.intp], float]:
     begin, end = begin[inner], end[inner]
     moving = np.minimum(moved[begin - 1], moved[np.minimum(end, same.size - 1)]) > MOVES[0] * step
     begin, end = begin[moving], end[moving]
-    one = 1 + np.flatnonzero((moved[1:-1] > 0.0) & (moved[1:-1] < 1.5 * step))
-    one = one[np.minimum(moved[one - 1], moved[one + 1]) > MOVES[0] * step]
-    if not _beyond_chance(change / step, begin, end, one):
+    single = 1 + np.flatnonzero((moved[1:-1] > 0.0) & (moved[1:-1] < 1.5 * step))
+    single = single[np.minimum(moved[single - 1], moved[single + 1]) > MOVES[0] * step]
+    if not _beyond_chance(change / step, begin, end, single):
         return none, 0.0
     length = end - begin
     within = np.arange(int(length.sum())) - np.repeat(np.cumsum(length) - length, length)
     rows = np.repeat(begin, length) + within + 1
     moving_rows = rows.size + np.count_nonzero(moved > MOVES[0] * step)
-    return rows, max(0.0, rows.size - 0.5 * one.size) / moving_rows
+    return rows, max(0.0, rows.size - 0.5 * single.size) / moving_rows
 
 
 def _beyond_chance(
     change: NDArray[np.float64],
     begin: NDArray[np.intp],
     end: NDArray[np.intp],
-    one: NDArray[np.intp],
+    single: NDArray[np.intp],
 ) -> bool:
     """Whether runs of no change are more than rounding gives a noisy output.
 
@@ -153,7 +153,7 @@ def _beyond_chance(
     """
     for least in MOVES:
         counts = []
-        for first, last in ((begin, end), (one, one + 1)):
+        for first, last in ((begin, end), (single, single + 1)):
             before, after = change[first - 1], change[last]
             fast = np.minimum(np.abs(before), np.abs(after)) > least
             counts.append((np.count_nonzero(fast), np.count_nonzero(fast & (before * after > 0.0))))

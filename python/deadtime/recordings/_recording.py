@@ -205,7 +205,7 @@ class Recording(ReadOnlyArrays):
 
     def _part(self, rows: slice | NDArray[np.bool_]) -> Recording:
         """The recording with these rows alone."""
-        parts: dict[str, Any] = {name: one[rows] for name, one in self._columns().items()}
+        parts: dict[str, Any] = {name: column[rows] for name, column in self._columns().items()}
         if self.sent is not None:
             kept = int(np.searchsorted(self.sent.time, parts["time"][-1], side="right"))
             sent = SentCommands(self.sent.time[:kept], self.sent.values[:kept])
@@ -257,7 +257,7 @@ class Recording(ReadOnlyArrays):
             )
         columns = self._columns()
         held = HELD if self.sent is None else ("reference",)
-        kept = rows_with_output(self.output, {one: columns[one] for one in held if one in columns})
+        kept = rows_with_output(self.output, {key: columns[key] for key in held if key in columns})
         return self if kept is None else self._part(kept)
 
     def check(self, loop: ControlLoop, window: OpenRange | None = None) -> RecordingCheck:

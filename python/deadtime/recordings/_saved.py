@@ -51,8 +51,8 @@ def save_table(
 ) -> None:
     """Write columns, units, source and commands sent as the suffix of the path says."""
     file = Path(path)
-    apart = {} if sent is None else {"sent": [part.tolist() for part in sent]}
-    described = json.dumps({"source": source, "units": dict(units), **apart})
+    commands = {} if sent is None else {"sent": [part.tolist() for part in sent]}
+    described = json.dumps({"source": source, "units": dict(units), **commands})
     if file.suffix == ".csv":
         rows = zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True)
         with file.open("w", encoding="utf-8", newline="\n") as stream:
@@ -74,13 +74,13 @@ def load_table(path: str | os.PathLike[str]) -> dict[str, Any]:
         if format_of(path, head, "read_recording") == "Parquet":
             described = parquet_metadata(path).get(b"deadtime", b"")
             table = arrow_file(path, "Parquet", set(NAMES))
-            told = _described(path, described)
-            return read_table(table, _signals(table.names), EVER) | told
+            fields = _described(path, described)
+            return read_table(table, _signals(table.names), EVER) | fields
         text = as_text(path, whole(stream, head), NAMES, ",")
     title, comment, *_ = (*text.comments, "", "")
     described = comment[1:].encode() if title == TITLE else b""
-    told = _described(path, described)
-    return read_csv(text, _signals(text.header), EVER) | told
+    fields = _described(path, described)
+    return read_csv(text, _signals(text.header), EVER) | fields
 
 
 def _signals(names: Iterable[str]) -> dict[str, str]:
@@ -89,12 +89,12 @@ def _signals(names: Iterable[str]) -> dict[str, str]:
 
 def _described(path: object, text: bytes) -> dict[str, Any]:
     try:
-        told = json.loads(text)
-        source, units = told["source"], told["units"]
-        if not isinstance(source, str) or not all(isinstance(one, str) for one in units.values()):
+        fields = json.loads(text)
+        source, units = fields["source"], fields["units"]
+        if not isinstance(source, str) or not all(isinstance(unit, str) for unit in units.values()):
             raise TypeError
-        if "sent" in told:
-            times, values = told["sent"]
+        if "sent" in fields:
+            times, values = fields["sent"]
             return {"source": source, "units": units, "command": None, "sent": (times, values)}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise RecordingError(

@@ -206,7 +206,7 @@ def study(
     report("designing without the delay, for comparison")
     # Without delay and hold no gain is too large: the same gains are looked at as with the delay.
     axes = designed.charts[0].axes.items()
-    same = None if fitted.is_sampled else {name: (one[0], one[-1]) for name, one in axes}
+    same = None if fitted.is_sampled else {name: (axis[0], axis[-1]) for name, axis in axes}
     naive = design(fitted, controller=template, delay=0.0, ranges=same, objective="abscissa")
     report("simulating both designs")
     loop_of_responses = fitted if truth is None else truth.truth

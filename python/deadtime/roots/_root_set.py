@@ -101,7 +101,7 @@ class RootSet(ReadOnlyArrays, Pictured):
         """Work on the roots as on an array, but compare as a whole: ``array == roots`` is False."""
         if method == "__call__" and ufunc in (np.equal, np.not_equal):
             return ufunc is np.not_equal
-        plain = [one.roots if isinstance(one, RootSet) else one for one in inputs]
+        plain = [operand.roots if isinstance(operand, RootSet) else operand for operand in inputs]
         return getattr(ufunc, method)(*plain, **options)
 
     def plot(self, ax: Axes | None = None, chains: Sequence[Chain] = ()) -> Axes:

@@ -152,8 +152,8 @@ def tiles(
     ... )
     >>> grid
     <100 by 100 tiles of Kp and Kv, 10000000000 cells>
-    >>> one = grid[10, 50]
-    >>> one.place[0], one.map(abscissa=False).unstable.shape
+    >>> tile = grid[10, 50]
+    >>> tile.place[0], tile.map(abscissa=False).unstable.shape
     (slice(10000, 11000, None), (1000, 1000))
     """
     axes = map_axes(ranges, shape, least=1, most=math.inf)

@@ -95,11 +95,11 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
 
     >>> import numpy as np
     >>> ahead = np.roll(np.eye(20), 1, axis=1)
-    >>> zero, one = np.zeros((20, 20)), np.eye(20)
+    >>> zero, identity = np.zeros((20, 20)), np.eye(20)
     >>> cars = dtm.DelaySystem(
     ...     {
-    ...         0.0: np.block([[zero, ahead - one], [zero, -0.9 * one]]),
-    ...         0.4: np.block([[zero, zero], [0.2 * one, zero]]),
+    ...         0.0: np.block([[zero, ahead - identity], [zero, -0.9 * identity]]),
+    ...         0.4: np.block([[zero, zero], [0.2 * identity, zero]]),
     ...     }
     ... )
     >>> cars.count(re=(-1, 0.5), im=(0.01, 1))

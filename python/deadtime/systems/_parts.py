@@ -47,38 +47,38 @@ def without_common_delay(
 
 
 def without_common_powers(
-    one: QuasiPolynomial, other: QuasiPolynomial
+    first: QuasiPolynomial, second: QuasiPolynomial
 ) -> tuple[QuasiPolynomial, QuasiPolynomial]:
     """Divide both by the highest power of s that divides every row of both exactly."""
-    k = min(one._native.powers_of_s(), other._native.powers_of_s())
-    one, other = (QuasiPolynomial._wrap(h._native.without_powers(k)) for h in (one, other))
-    return one, other
+    k = min(first._native.powers_of_s(), second._native.powers_of_s())
+    first, second = (QuasiPolynomial._wrap(h._native.without_powers(k)) for h in (first, second))
+    return first, second
 
 
 def without_common_factor(
-    one: QuasiPolynomial, other: QuasiPolynomial
+    num: QuasiPolynomial, den: QuasiPolynomial
 ) -> tuple[QuasiPolynomial, QuasiPolynomial]:
     """Divide both by the greatest polynomial that divides every row of both.
 
     Computed in integers, by Euclid's algorithm. If a quotient is no double, nothing is divided.
     """
-    rows = [_whole(row) for h in (one, other) for row in h.coefficients]
+    rows = [_whole(row) for h in (num, den) for row in h.coefficients]
     factor: _Whole = []
     for row, _ in rows:
         factor = _greatest_divisor(factor, row)
     if factor[-1] < 0:
         factor = [-number for number in factor]
     if len(factor) < 2:
-        return one, other
+        return num, den
     quotients = [
         [Fraction(number) / unit for number in _divided(row, factor)[0]] for row, unit in rows
     ]
     if any(_rounded(number) != number for row in quotients for number in row):
-        return one, other
+        return num, den
     width = max(map(len, quotients))
     table = [[float(number) for number in row] + [0.0] * (width - len(row)) for row in quotients]
-    first = len(one.delays)
-    return QuasiPolynomial(table[:first], one.delays), QuasiPolynomial(table[first:], other.delays)
+    first = len(num.delays)
+    return QuasiPolynomial(table[:first], num.delays), QuasiPolynomial(table[first:], den.delays)
 
 
 #: A polynomial with integer coefficients, in ascending powers; the last one is not zero.
@@ -113,14 +113,14 @@ def _divided(dividend: _Whole, divisor: _Whole) -> tuple[_Whole, _Whole]:
     return quotient, _trimmed(rest)
 
 
-def _greatest_divisor(one: _Whole, other: _Whole) -> _Whole:
+def _greatest_divisor(a: _Whole, b: _Whole) -> _Whole:
     """Greatest common divisor, its coefficients without a common factor."""
-    while other:
-        one, other = other, _divided(one, other)[1]
-        common = math.gcd(*other)
-        other = [number // common for number in other]
-    common = math.gcd(*one)
-    return [number // common for number in one]
+    while b:
+        a, b = b, _divided(a, b)[1]
+        common = math.gcd(*b)
+        b = [number // common for number in b]
+    common = math.gcd(*a)
+    return [number // common for number in a]
 
 
 def _rounded(number: Fraction) -> Fraction | None:

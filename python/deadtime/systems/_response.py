@@ -209,12 +209,12 @@ class Response(ReadOnlyArrays, Pictured):
         if steady_state is None and self.steady_state is not None:
             steady_state = float(np.ravel(self.steady_state)[index])
         dense = self._dense
-        one = OneSignal(
+        signal = OneSignal(
             self.time,
             signals[index],
             None if dense is None else lambda times: np.atleast_2d(dense(times))[index],
         )
-        found = one.step_metrics(settling, rise, steady_state)
+        found = signal.step_metrics(settling, rise, steady_state)
         judge = getattr(dense, "stays_settled", None)
         if judge is not None and not judge(self.time, self.inputs, found["settling_time"]):
             found["settling_time"] = float("nan")

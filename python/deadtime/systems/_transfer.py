@@ -419,8 +419,8 @@ def feedback(G: Any, H: Any = 1.0, sign: int = -1) -> TransferFunction:
     -1.515362
     """
     forward, back = _operand(G), _operand(H)
-    for name, one, given in (("G", forward, G), ("H", back, H)):
-        if one is None:
+    for name, block, given in (("G", forward, G), ("H", back, H)):
+        if block is None:
             raise TypeError(f"{name}={given!r}: give a TransferFunction, for example 2.0 / s")
     if sign not in (-1, 1):
         raise ValueError(f"sign={sign!r}: give -1 for negative or 1 for positive feedback")

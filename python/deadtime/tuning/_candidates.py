@@ -23,8 +23,10 @@ class Gathered:
 
     def at(self, scenarios: Sequence[Scenario]) -> list[Loop]:
         """The loops in these scenarios."""
-        keys = [tuple(one.values()) for one in scenarios]
-        new = {key: one for key, one in zip(keys, scenarios, strict=True) if key not in self._kept}
+        keys = [tuple(case.values()) for case in scenarios]
+        new = {
+            key: case for key, case in zip(keys, scenarios, strict=True) if key not in self._kept
+        }
         if new:
             made = self.loop.specification.kernels_at([*new.values()])
             self._kept |= zip(new, made, strict=True)

@@ -254,7 +254,8 @@ def _load_slack(
 def _loops_of(plants: Sequence[object], template: Controller) -> tuple[ControlLoop, ...]:
     """The loops around further plants."""
     return tuple(
-        one if isinstance(one, ControlLoop) else ControlLoop(one, template) for one in plants
+        plant if isinstance(plant, ControlLoop) else ControlLoop(plant, template)
+        for plant in plants
     )
 
 

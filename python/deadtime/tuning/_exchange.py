@@ -84,11 +84,11 @@ class Search:
         """Each once: those it begins with, those it judges and those of exact margins."""
         problem = self.problem
         every = [problem.middle, *problem.corners, *self._fine, *self._exact]
-        return [*{tuple(one.items()): one for one in every}.values()]
+        return [*{tuple(scenario.items()): scenario for scenario in every}.values()]
 
     def _places(self, scenarios: Sequence[Scenario]) -> list[int]:
-        known = {tuple(one.items()): place for place, one in enumerate(self._scenarios)}
-        return [known[tuple(one.items())] for one in scenarios]
+        known = {tuple(scenario.items()): place for place, scenario in enumerate(self._scenarios)}
+        return [known[tuple(scenario.items())] for scenario in scenarios]
 
     @cached_property
     def _native(self) -> GainSearch:
@@ -145,15 +145,15 @@ class Search:
         problem = self.problem
         judged = [*self._fine, found.worst]
         places = zip(self._near(judged), judged, strict=True)
-        spots = [(place, one["delay"]) for place, one in places]
+        spots = [(place, scenario["delay"]) for place, scenario in places]
         worst = found.value
         steps = self._native.proved_steps(spots, found.gains.tolist())
-        for one, step in zip(judged, steps, strict=True):
+        for scenario, step in zip(judged, steps, strict=True):
             if step is None:
-                told = ", ".join(f"{name} = {number:.6g}" for name, number in one.items())
+                case = ", ".join(f"{name} = {number:.6g}" for name, number in scenario.items())
                 raise ValueError(
                     f"with {problem.named(found.gains)}, a step of {problem.amplitude:g} "
-                    f"settles in simulation. But for {told}, no proof was found that the output "
+                    f"settles in simulation. But for {case}, no proof was found that the output "
                     "stays in the band. Require margins, or give another objective"
                 )
             worst = max(worst, step[SIMULATED.index(self.objective)])
@@ -161,8 +161,8 @@ class Search:
 
     def _near(self, scenarios: Sequence[Scenario]) -> list[int]:
         """Places of loops that differ from these scenarios in the delay at most."""
-        rest = [{**one, "delay": 0.0} for one in self._scenarios]
-        return [rest.index({**one, "delay": 0.0}) for one in scenarios]
+        rest = [{**scenario, "delay": 0.0} for scenario in self._scenarios]
+        return [rest.index({**scenario, "delay": 0.0}) for scenario in scenarios]
 
 
 def _unmet(

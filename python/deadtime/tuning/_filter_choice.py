@@ -184,15 +184,15 @@ def filter_choice(
     if noise is not None and command_noise is not None:
         most = positive("command_noise", command_noise) / positive("noise", noise)
         rule = f"the fastest filter with a command noise of at most {command_noise:g}"
-        omega = _last(task, corners, tried, 1, lambda one: one.noise_gain <= most)
+        omega = _last(task, corners, tried, 1, lambda case: case.noise_gain <= most)
         if omega is None:
             raise _too_noisy(corners, tried, most)
     else:
         loss = positive("loss", loss)
         rule = f"the slowest filter that loses at most {100 * loss:g} %"
-        worse = [lost(objective, one.value, ideal.value) for one in tried]
+        worse = [lost(objective, case.value, ideal.value) for case in tried]
         omega = _last(
-            task, corners, tried, -1, lambda one: lost(objective, one.value, ideal.value) <= loss
+            task, corners, tried, -1, lambda case: lost(objective, case.value, ideal.value) <= loss
         )
         if omega is None:
             raise _too_slow(corners, worse, loss)
@@ -203,8 +203,8 @@ def filter_choice(
         design=chosen,
         ideal=ideal,
         omegas=corners,
-        values=np.array([one.value for one in tried]),
-        noise_gains=np.array([one.noise_gain for one in tried]),
+        values=np.array([case.value for case in tried]),
+        noise_gains=np.array([case.noise_gain for case in tried]),
         value=chosen.value,
         noise_gain=noise_gain(chosen.loop, white),
         ideal_noise_gain=noise_gain(ideal.loop, white),
@@ -299,7 +299,7 @@ def _too_noisy(corners: Array, tried: Sequence[_Tried], most: float) -> ValueErr
     """Why every corner makes more noise."""
     return ValueError(
         f"no corner from {corners[0]:.4g} rad/s on has a noise gain of {most:.4g} or less, and "
-        f"the smallest noise gain is {np.nanmin([one.noise_gain for one in tried]):.4g}. Allow "
+        f"the smallest noise gain is {np.nanmin([trial.noise_gain for trial in tried]):.4g}. Allow "
         "more noise, give slower omegas, or smaller gains"
     )
 
@@ -315,10 +315,10 @@ def _last(
 
     It halves the way to the neighbour that does not.
     """
-    places = [place for place, one in enumerate(tried) if keeps(one)]
+    places = [place for place, trial in enumerate(tried) if keeps(trial)]
     if not places:
         return None
-    place = max(places, key=lambda one: step * one)
+    place = max(places, key=lambda index: step * index)
     kept = float(corners[place])
     if 0 <= place + step < len(corners):
         other = float(corners[place + step])

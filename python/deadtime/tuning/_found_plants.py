@@ -42,8 +42,8 @@ def possible_loops(
     around = [
         loop.replace(**numbers, gain=gain) for numbers, gain in itertools.product(shapes, gains)
     ]
-    rivals = [one for one in fit.candidates[1:] if one.behind < CLEAR][:KINDS]
-    return [loop, *around, *(loop.replace(plant=one.plant, delay=one.delay) for one in rivals)]
+    rivals = [candidate for candidate in fit.candidates[1:] if candidate.behind < CLEAR][:KINDS]
+    return [loop, *around, *(loop.replace(plant=kind.plant, delay=kind.delay) for kind in rivals)]
 
 
 def refusal(fit: PlantEstimate) -> str | None:
@@ -54,7 +54,7 @@ def refusal(fit: PlantEstimate) -> str | None:
 def _shapes(fit: PlantEstimate, loop: ControlLoop, level: float) -> Iterator[dict[str, float]]:
     """Dead time and lag at the ends of the dead time, of its sum with the lags, and of the lag."""
     numbers = loop.plant.parameters
-    name = next((one for one in LAGS if numbers.get(one)), None)
+    name = next((parameter for parameter in LAGS if numbers.get(parameter)), None)
     if name is None:
         yield from ({"delay": late} for late in fit.ci(level, "delay"))
         return

@@ -160,7 +160,7 @@ def check_gains(
     <Gate refused: Ms is 3.663 in the worst loop, but at most 2 is allowed; the gain Kp ...
     """
     judge = _Judge(positive("max_sensitivity", max_sensitivity))
-    every = [*judge.loops_of(of, gains, level, override), *(_with(one, gains) for one in loops)]
+    every = [*judge.loops_of(of, gains, level, override), *(_with(case, gains) for case in loops)]
     loop = every[0]
     judge.stability(every)
     judge.hidden_modes(loop)
@@ -256,7 +256,7 @@ class _Judge:
         around = []
         try:
             points = region_of(of, level, allow_indication=True).points
-            around = [loop.replace(**one) for one in points]
+            around = [loop.replace(**point) for point in points]
         except ValueError as error:
             self.reasons.append(str(error))
         return self._signed(of, [loop, *around], level)
@@ -286,10 +286,10 @@ class _Judge:
             try:
                 found = loop._margin(delay_margin=False)
             except ValueError as error:
-                self.reasons.append(f"the margins are not known if {_told(loop)}: {error}")
+                self.reasons.append(f"the margins are not known if {_numbers(loop)}: {error}")
                 return
             if not found.stable:
-                self.reasons.append(f"the loop is not stable if {_told(loop)}")
+                self.reasons.append(f"the loop is not stable if {_numbers(loop)}")
                 return
             worst = max(worst, found.max_sensitivity)
         self.sensitivity = worst
@@ -343,7 +343,7 @@ class _Judge:
             if not math.isfinite(settled):
                 self.reasons.append(
                     f"a step of {height:.3g} does not come to rest within the limit of "
-                    f"{limit_in_words(loop)} if {_told(loop)}"
+                    f"{limit_in_words(loop)} if {_numbers(loop)}"
                 )
                 return
 
@@ -387,12 +387,12 @@ class _Judge:
             now = after.get(name, 0.0)
             if was == now:
                 continue
-            told = f"from {was:.4g} to {now:.4g}"
+            values = f"from {was:.4g} to {now:.4g}"
             if was * now < 0.0:
-                self.reasons.append(f"the gain {name} changes its sign, {told}")
+                self.reasons.append(f"the gain {name} changes its sign, {values}")
             elif was != 0.0 and not 1.0 / most <= now / was <= most * (1.0 + 1e-12):
                 self.reasons.append(
-                    f"the gain {name} changes {told}, which is more than a factor of {most:g}"
+                    f"the gain {name} changes {values}, which is more than a factor of {most:g}"
                 )
 
 
@@ -432,7 +432,7 @@ def _noise_of(of: ControlLoop | DelayEstimate | PlantEstimate) -> float | None:
     return None
 
 
-def _told(loop: ControlLoop) -> str:
+def _numbers(loop: ControlLoop) -> str:
     """The numbers of the plant in words."""
     numbers = loop.plant.parameters | {"delay": loop.delay}
     return ", ".join(f"{name} = {value:.4g}" for name, value in numbers.items())

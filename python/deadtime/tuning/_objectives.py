@@ -30,9 +30,9 @@ SIMULATED: tuple[ObjectiveName, ...] = ("settling_time", "overshoot")
 def objective_named(name: str) -> ObjectiveName:
     """The objective of that name, which is no response."""
     known: tuple[ObjectiveName, ...] = (*_BY_POLES, *SIMULATED)
-    for one in get_args(ObjectiveName):
-        if one == name and one in known:
-            return one  # type: ignore[no-any-return]
+    for objective in get_args(ObjectiveName):
+        if objective == name and objective in known:
+            return objective  # type: ignore[no-any-return]
     raise ValueError(f"objective={name!r}: give one of {', '.join(map(repr, known))}")
 
 

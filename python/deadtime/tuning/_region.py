@@ -66,7 +66,7 @@ class ConfidenceRegion(ReadOnlyArrays):
     def intervals(self) -> dict[str, Range]:
         """Smallest and largest value of each number."""
         return {
-            name: (min(one[name] for one in self.points), max(one[name] for one in self.points))
+            name: (min(case[name] for case in self.points), max(case[name] for case in self.points))
             for name in self.estimate
         }
 
@@ -107,8 +107,8 @@ def region_of(fit: DelayEstimate, level: float, allow_indication: bool) -> Confi
         level=level,
         verdict=fit.verdict,
         estimate=known,
-        extremes=tuple(scenario(sign * radius * one) for one in tangents for sign in (-1.0, 1.0)),
-        points=(known, *(scenario(radius * one) for one in around)),
+        extremes=tuple(scenario(sign * radius * axis) for axis in tangents for sign in (-1.0, 1.0)),
+        points=(known, *(scenario(radius * axis) for axis in around)),
     )
     low, high = region.intervals.get("gain", (1.0, 1.0))
     if low * high <= 0.0:

@@ -102,8 +102,8 @@ class Wanted:
     def design(self) -> Design:
         """The gains, and their properties over all scenarios."""
         problem = self.problem
-        corners = [problem.middle, *(one for one in problem.corners if one != problem.middle)]
-        every = [*corners, *(one for one in fine(problem) if one not in corners)]
+        corners = [problem.middle, *(case for case in problem.corners if case != problem.middle)]
+        every = [*corners, *(case for case in fine(problem) if case not in corners)]
         if not problem.loop.plant.is_rational and self.objective != "load_ie":
             raise ValueError(
                 "for a plant with delays inside, responses to a load or a step cannot be "
@@ -136,7 +136,7 @@ class Wanted:
                 middle.specification.kernel, white_to(middle, self.demands.bandwidth)
             ),
             _problem=problem,
-            _others=tuple(one.replace(controller=middle.controller) for one in self.others),
+            _others=tuple(loop.replace(controller=middle.controller) for loop in self.others),
             _doubt=self.doubt,
         )
 
@@ -210,11 +210,11 @@ class Wanted:
 def _least(found: RobustGains) -> LeastMargins:
     """Each margin at its least, Ms and Mt at their largest; delay margins as far as known."""
     each = found.margins
-    late = [one.delay_margin for one in each if not math.isnan(one.delay_margin)]
+    late = [margins.delay_margin for margins in each if not math.isnan(margins.delay_margin)]
     return LeastMargins(
-        min(one.gain_margin for one in each),
-        min(one.phase_margin for one in each),
+        min(margins.gain_margin for margins in each),
+        min(margins.phase_margin for margins in each),
         min(late, default=math.nan),
-        max(one.max_sensitivity for one in each),
-        max(one.max_complementary_sensitivity for one in each),
+        max(margins.max_sensitivity for margins in each),
+        max(margins.max_complementary_sensitivity for margins in each),
     )

@@ -210,7 +210,7 @@ class Design(ReadOnlyArrays, Pictured):
         if problem is not None:
             gains = [self.gains[name] for name in problem.free]
             spread = problem.scenarios(3) if region is None else region.points
-            every += [problem.at(gains, one) for one in spread]
+            every += [problem.at(gains, scenario) for scenario in spread]
         doubt = self._doubt
         if region is not None and region.verdict != "reliable":
             doubt = "the estimate is only an indication"

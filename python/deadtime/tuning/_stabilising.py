@@ -128,8 +128,8 @@ def candidate_ranges(loop: ControlLoop, free: Sequence[str]) -> tuple[dict[str, 
     other = low if critical == high else high
     wide = _ranges(free, critical, late)
     # A narrow interval far from zero falls between the points of a wide map.
-    room = critical - other
-    narrow = _ranges(free, 0.25 * room, late) | {"Kp": found.widest}
+    width = critical - other
+    narrow = _ranges(free, 0.25 * width, late) | {"Kp": found.widest}
     return wide, {name: narrow[name] for name in free}
 
 

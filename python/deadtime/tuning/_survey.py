@@ -110,10 +110,10 @@ def worst_abscissa(
             name: float(axis[i]) for name, axis, i in zip(free[2:], axes[2:], layer, strict=True)
         }
         place: Any = (..., *layer)
-        for one in scenarios:
-            chart = _mapped(problem, one | held, plane)
+        for scenario in scenarios:
+            chart = _mapped(problem, scenario | held, plane)
             if maps is not None and not held:
-                maps[frozenset(one.items())] = chart
+                maps[frozenset(scenario.items())] = chart
             worst[place] = np.maximum(worst[place], _judged(chart))
     return worst
 
@@ -167,9 +167,9 @@ def _by_the_rest(
 ) -> dict[tuple[tuple[str, float], ...], list[float]]:
     """Delays of the scenarios that agree in everything else."""
     found: dict[tuple[tuple[str, float], ...], list[float]] = {}
-    for one in scenarios:
-        rest = tuple((name, value) for name, value in one.items() if name != "delay")
-        found.setdefault(rest, []).append(one["delay"])
+    for scenario in scenarios:
+        rest = tuple((name, value) for name, value in scenario.items() if name != "delay")
+        found.setdefault(rest, []).append(scenario["delay"])
     return found
 
 

@@ -18,7 +18,7 @@ WAYS = {"command_late": 1, "command_early": -1}
 
 def rows_off(check: RecordingCheck) -> int:
     """By how many rows a command was logged late, as the law of its controller shows."""
-    return next((WAYS[one.code] for one in check.findings if one.code in WAYS), 0)
+    return next((WAYS[finding.code] for finding in check.findings if finding.code in WAYS), 0)
 
 
 def on_its_row(recording: Recording, loop: ControlLoop, check: RecordingCheck) -> Recording:

@@ -177,7 +177,7 @@ def read_ringing(recording: Recording) -> list[Extreme]:
 
 
 def _extremes(since: Array, beyond: Array, noise: float) -> list[Extreme]:
-    return [Extreme(*one) for one in step_extremes(since, beyond, noise)]
+    return [Extreme(*fields) for fields in step_extremes(since, beyond, noise)]
 
 
 def check_decays(extremes: Sequence[Extreme], method: str) -> None:

@@ -157,4 +157,4 @@ def causes_of(found: native.FamilyFit) -> tuple[Cause, ...]:
 
 def sensor_faults_of(found: native.FamilyFit) -> tuple[SensorFault, ...]:
     """What sensors did, in the answer of the kernel."""
-    return tuple(SensorFault(*one) for one in found.sensor_faults)
+    return tuple(SensorFault(*fault) for fault in found.sensor_faults)

@@ -104,20 +104,20 @@ class PlantEstimate(FoundPlant, Pictured):
         """All results but the arrays, as plain values for JSON."""
         names = ["name", "delay", "parameters", "behind", "determined", "noise_std"]
         tried = [
-            {one: getattr(candidate, one) for one in names} | {"words": candidate.in_words()}
+            {name: getattr(candidate, name) for name in names} | {"words": candidate.in_words()}
             for candidate in self.candidates
         ]
-        found_one = self.verdict != "none"
+        has_plant = self.verdict != "none"
         found: dict[str, Any] = {
             "verdict": self.verdict,
             "reason": self.reason,
             "headline": self.headline(),
-            "plant": self.best.in_words() if found_one else None,
-            "parameters": dict(self.parameters) if found_one else None,
+            "plant": self.best.in_words() if has_plant else None,
+            "parameters": dict(self.parameters) if has_plant else None,
             "interval_95": dict(self.intervals) if self.verdict == "reliable" else None,
-            "crossover": self.crossover if found_one else None,
-            "largest_gain": self.largest_gain if found_one else None,
-            "delay_at_crossover": self.delay_at_crossover if found_one else None,
+            "crossover": self.crossover if has_plant else None,
+            "largest_gain": self.largest_gain if has_plant else None,
+            "delay_at_crossover": self.delay_at_crossover if has_plant else None,
             "candidates": tried,
             "determined": self.determined,
             "asked": self.asked,

@@ -35,7 +35,7 @@ def estimate_by_evidence(
     question = questions_of(recording, window, known)
     found = question.answer(progress=progress)
     first = estimate_of(question, found)
-    moves_at_all = any(np.ptp(one.command) > 0.0 for one in question.each)
+    moves_at_all = any(np.ptp(part.command) > 0.0 for part in question.each)
     if first.at_rest or moves_in(first) or not moves_at_all:
         return _beside_all(first, found)
     if question.at_rest is False:
@@ -86,8 +86,8 @@ def refit(
         When a recording has too few rows.
     """
     first, *others = (
-        replace(fit._question, recording=one, earlier=0, window=None, shift=0, others=())
-        for one in recordings
+        replace(fit._question, recording=recording, earlier=0, window=None, shift=0, others=())
+        for recording in recordings
     )
     plant = fit.best.name if likeliest else first.plant
     question = replace(first, others=tuple(others), plant=plant)
@@ -117,10 +117,10 @@ def _ends(found: native.FamilyFit, omega: float) -> list[Ends]:
 
 def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
     """The answer of the kernel as a result."""
-    answering = [one for one in found.candidates if one.values[one.names.index("gain")] != 0.0]
-    candidates = tuple(candidate_of(one, answering[0].bic) for one in answering)
+    answering = [fit for fit in found.candidates if fit.values[fit.names.index("gain")] != 0.0]
+    candidates = tuple(candidate_of(fit, answering[0].bic) for fit in answering)
     first, best = (answering[0], candidates[0]) if answering else (None, None)
-    runs = [_run(one, first, place) for place, one in enumerate(question.each)]
+    runs = [_run(part, first, place) for place, part in enumerate(question.each)]
     numbers: dict[str, Any] = {
         "delay": math.nan if best is None else best.delay,
         "plant": None if best is None else best.plant,

@@ -342,21 +342,21 @@ class FoundPlant(AtCrossover, ReadOnlyArrays):
         """
         around = self.loop(controller, sample_time=sample_time, limit=limit)
         found = self._answer().candidates
-        least = min(one.bic for one in found)
-        near = [one for one in found if one.bic <= least + CLEAR and one.told == len(one.names)]
+        least = min(fit.bic for fit in found)
+        near = [fit for fit in found if fit.bic <= least + CLEAR and fit.told == len(fit.names)]
         parts = []
-        for one in near or found[:1]:
+        for fit in near or found[:1]:
 
-            def number(values: Array, one: native.FamilyCandidate = one) -> float:
-                delay, plant = plant_of(one, values.tolist())
+            def number(values: Array, fit: native.FamilyCandidate = fit) -> float:
+                delay, plant = plant_of(fit, values.tolist())
                 return float(of(around.replace(plant=plant, delay=delay)))
 
-            steps = np.diag(STEP * np.array(one.errors))
-            values, n = np.array(one.values), len(one.names)
+            steps = np.diag(STEP * np.array(fit.errors))
+            values, n = np.array(fit.values), len(fit.names)
             slopes = [(number(values + h) - number(values - h)) / 2.0 / STEP for h in steps]
-            unit = np.outer(one.errors, one.errors)
-            correlation = np.array(one.covariance).reshape(n, n) / np.where(unit > 0.0, unit, 1.0)
-            reach = one.quantile * math.sqrt(max(float(slopes @ correlation @ slopes), 0.0))
+            unit = np.outer(fit.errors, fit.errors)
+            correlation = np.array(fit.covariance).reshape(n, n) / np.where(unit > 0.0, unit, 1.0)
+            reach = fit.quantile * math.sqrt(max(float(slopes @ correlation @ slopes), 0.0))
             parts.append((number(values), reach))
         low = min(value - reach for value, reach in parts)
         return parts[0][0], (low, max(value + reach for value, reach in parts))

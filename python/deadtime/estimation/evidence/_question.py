@@ -107,7 +107,7 @@ class Question(ReadOnlyArrays):
         With the answer to fewer rows, plants are looked for beside those alone; with a noise, under
         that alone.
         """
-        records = [one.record for one in self.each]
+        records = [part.record for part in self.each]
         return native.fit_family(
             records,
             kind=self.between,
@@ -130,7 +130,7 @@ class Question(ReadOnlyArrays):
         """What was given besides the recording, as arguments of `estimate_delay`."""
         found: dict[str, Any] = {}
         for name in ("window", "controller"):
-            own = [getattr(one, name) for one in self.each]
+            own = [getattr(part, name) for part in self.each]
             found[name] = own[0] if own.count(own[0]) == len(own) else own
         for name in ("limit", "at_rest", "largest_delay", "integrates", "plant"):
             found[name] = getattr(self, name)

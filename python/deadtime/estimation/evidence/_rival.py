@@ -164,7 +164,7 @@ def _lead(found: native.FamilyFit, kind: str) -> float:
 
 def _bic_of(found: native.FamilyFit, kind: str) -> float:
     """BIC of the best plant of a kind; infinite where it could not be fitted."""
-    return min((one.bic for one in found.candidates if one.plant == kind), default=math.inf)
+    return min((fit.bic for fit in found.candidates if fit.plant == kind), default=math.inf)
 
 
 def _ends(fit: DelayEstimate, omega: float) -> list[tuple[float, float]]:

@@ -262,7 +262,7 @@ def _advice_on(fit: FoundPlant) -> Advice:
 
 def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
     if fit._code in ("too few told", "classes contradict", "crossover not told"):
-        known = [one for one in fit.candidates if len(one.parameters) <= fit.determined]
+        known = [plant for plant in fit.candidates if len(plant.parameters) <= fit.determined]
         words = "record again with a command that steps up and down at irregular intervals"
         if known and "plant" not in given:
             words += (

@@ -30,7 +30,7 @@ def disturbances_of(noise: FlightNoise, slow: float) -> list[Disturbance]:
         Disturbance(True, slow, walk / noise.white),
         Disturbance(False, noise.sensor_time, noise.sensor / noise.white),
     ]
-    return [one for one in every if one.deviation > 0.0]
+    return [disturbance for disturbance in every if disturbance.deviation > 0.0]
 
 
 def whitened(

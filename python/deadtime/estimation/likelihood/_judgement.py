@@ -74,11 +74,11 @@ class Adequacy:
 def adequacy_of(profile: FlightProfile) -> Adequacy:
     """Test a fit."""
     found = profile.judge()
-    against = [one for one in found.findings if one.is_against]
+    against = [finding for finding in found.findings if finding.is_against]
     return Adequacy(
         Whiteness(*found.whiteness),
-        tuple(_in_words(one, profile) for one in against),
-        any(one.plant_lacks for one in against),
+        tuple(_in_words(finding, profile) for finding in against),
+        any(finding.plant_lacks for finding in against),
         found.is_coloured,
     )
 

@@ -64,8 +64,8 @@ def concluded_flight(
     unseen = fit.unseen_lag
     left_out = sum(rows.left_out for rows in fit.runs)
     fitted = tuple(
-        FittedRun(run.recording, run.loop.replace(**values), part.residuals, one)
-        for run, part, one in zip(runs, fit.parts, noise, strict=True)
+        FittedRun(run.recording, run.loop.replace(**values), part.residuals, run_noise)
+        for run, part, run_noise in zip(runs, fit.parts, noise, strict=True)
     )
     held = [name for name in names if name.startswith(("lag", "delay")) and values[name] == 0.0]
     stderr, least = (
@@ -102,8 +102,8 @@ def concluded_flight(
 
 
 def _noise_of(fit: native.FlightFit, run: int) -> FlightNoise:
-    white, air, air_time, *others = fit.noise_in_units(run)
-    return FlightNoise(white, air, air_time, 0.0, *others)
+    white, disturbance, air_time, *others = fit.noise_in_units(run)
+    return FlightNoise(white, disturbance, air_time, 0.0, *others)
 
 
 def gain_is_certain(profile: native.FlightProfile) -> bool:
@@ -151,23 +151,25 @@ def read_as_intervals(estimate: DelayEstimate, models: Sequence[CommandedModel])
     profile = estimate._profile
     assert isinstance(profile, native.FlightProfile)
     fit = profile.fit
-    parts = tuple(one.started(fit, {}) for one in models)
+    parts = tuple(commanded_model.started(fit, {}) for commanded_model in models)
     model: Model = parts[0] if len(parts) == 1 else JointModel(parts, (1.0,) * len(parts))
     readings = native.RoundedReadings.of_rows(
-        [one.rows for one in models], fit.runs, [one.repeated for one in models]
+        [commanded_model.rows for commanded_model in models],
+        fit.runs,
+        [commanded_model.repeated for commanded_model in models],
     )
     names, count = estimate.free, len(estimate.free)
-    start = np.concatenate([parts[0].start[:count], *(one.start[count:] for one in parts)])
+    start = np.concatenate([parts[0].start[:count], *(part.start[count:] for part in parts)])
     peak = model.problem.likeliest_rounded(readings, start)
     plain, bounds = standard_errors(names, peak.cov), dict(profile.bounds)
     unseen = {name: error / bounds[name] for name, error in profile.stderr}
     freedom = readings.count - peak.point.size - len(parts)
     values = dict(zip(names, peak.point.tolist(), strict=False))
     residuals = np.split(-model.misfit(peak.point), np.cumsum(model.sizes)[:-1])
-    noise = [FlightNoise(white=one) for one in peak.noise]
+    noise = [FlightNoise(white=white) for white in peak.noise]
     runs = tuple(
-        FittedRun(run.recording, run.loop.replace(**values), piece, one)
-        for run, piece, one in zip(estimate.runs, residuals, noise, strict=True)
+        FittedRun(run.recording, run.loop.replace(**values), piece, run_noise)
+        for run, piece, run_noise in zip(estimate.runs, residuals, noise, strict=True)
     )
     message = estimate.message.replace(str(estimate.noise), f"{noise[0]} before the rounding")
     return replace(

@@ -42,14 +42,14 @@ def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> l
     loops = one_each("loop", loop, len(recordings))
     windows = one_each("window", window, len(recordings))
     runs = []
-    for index, (one, its_loop, ends) in enumerate(zip(recordings, loops, windows, strict=True)):
-        if not isinstance(one, Recording):
-            raise TypeError(f"recording[{index}] must be a Recording, not {type(one).__name__}")
+    for index, (record, its_loop, ends) in enumerate(zip(recordings, loops, windows, strict=True)):
+        if not isinstance(record, Recording):
+            raise TypeError(f"recording[{index}] must be a Recording, not {type(record).__name__}")
         if not isinstance(its_loop, ControlLoop):
             raise TypeError(f"loop[{index}] must be a ControlLoop, not {type(its_loop).__name__}")
         open_interval("window", ends)
         low, high = (None, None) if ends is None else ends
-        runs.append(Run(one.complete(), its_loop, (low, high)))
+        runs.append(Run(record.complete(), its_loop, (low, high)))
     plants = {type(run.loop.plant).__name__ for run in runs}
     if len(plants) > 1:
         raise ValueError(

@@ -117,7 +117,7 @@ def estimate_from_commands(
     """
     stamped = _estimated(method, runs, free, assumed)
     regular = [on_regular_times(run) or run for run in runs]
-    if all(one is run for one, run in zip(regular, runs, strict=True)):
+    if all(regular_run is run for regular_run, run in zip(regular, runs, strict=True)):
         return stamped
     even = _estimated(method, regular, free, assumed)
     # Each has as many numbers, and neither is more usual.
@@ -208,24 +208,24 @@ class _Begun:
     @property
     def criterion(self) -> float:
         """Akaike's criterion, in which an unknown command is a number."""
-        return self.whole.criterion + 2.0 * sum(one.commands.unknown for one in self.models)
+        return self.whole.criterion + 2.0 * sum(model.commands.unknown for model in self.models)
 
     @property
     def fitted(self) -> list[Run]:
         """The recordings as they are fitted."""
         pairs = zip(self.models, self.runs, strict=True)
-        return [Run(one.recording, run.loop) for one, run in pairs]
+        return [Run(model.recording, run.loop) for model, run in pairs]
 
     @property
     def message(self) -> str:
         """What is fitted to what, in words."""
-        sources = {one.source for one in self.models}
+        sources = {model.source for model in self.models}
         text = f"over {', '.join(self.names.free)} on the response to the command"
         if self.assumed.computed:
             text += " computed from the recorded output, on whose noise the controller acts"
         elif sources != {"logged"}:
             text += ", which was not logged but computed from reference and output"
-        elif lost := sum(one.commands.lost for one in self.models):
+        elif lost := sum(model.commands.lost for model in self.models):
             gaps = f"gap{'s' * (lost > 1)}"
             text += f", where commands in {lost} {gaps} of their log are assumed to be lost"
         if (known := self.assumed.output_filter) is not None:
@@ -234,7 +234,7 @@ class _Begun:
 
     def details(self, initial_output: float) -> dict[str, Any]:
         """Further results."""
-        sources = sorted({one.source for one in self.models})
+        sources = sorted({model.source for model in self.models})
         noise = {"noise": "loop"} if self.assumed.computed else {}
         given = self.assumed.initial_output
         start = initial_output if given is None else given
@@ -243,7 +243,7 @@ class _Begun:
     @cached_property
     def plain(self) -> tuple[Model, Minimum]:
         """Least squares with all its derivatives, from that of the likelihood."""
-        model, found = solve_jointly([one.started(self.white, self.numbers) for one in self.models])
+        model, found = solve_jointly([run.started(self.white, self.numbers) for run in self.models])
         return model, without_vanishing(model, found)
 
     @property
@@ -284,8 +284,8 @@ def _likeliest(begun: _Begun) -> _Likeliest:
             )
         values = dict(numbers.values)
         fitted = [run._replace(loop=run.loop.replace(**values)) for run in fitted]
-    if any(one.commands.are_computed for one in models):
-        commands = [one.commands for one in models]
+    if any(model.commands.are_computed for model in models):
+        commands = [model.commands for model in models]
         fit, unclear, covariance = fit.between_rows(commands, not begun.numbers)
     profile = flight.profile_for(fit, begun.assumed.intervals, covariance, numbers)
     doubts = (
@@ -297,7 +297,7 @@ def _likeliest(begun: _Begun) -> _Likeliest:
 
 def _check_delay(begun: _Begun, profile: native.FlightProfile) -> None:
     """Refuse a fit at the longest delay, and one that explains hardly more than a constant does."""
-    longest = min(native.LONGEST_DELAY * one.span for one in begun.models)
+    longest = min(native.LONGEST_DELAY * model.span for model in begun.models)
     if "delay" in begun.names.free and profile.fit.numbers.delay >= longest * (1.0 - 1e-3):
         raise NotIdentifiableError(
             f"the search ends at its longest delay, {longest:g} s, which is "
@@ -353,9 +353,9 @@ def _concluded(begun: _Begun, found: _Likeliest, adequacy: Adequacy) -> DelayEst
 def _begun(method: str, runs: Sequence[Run], names: _Names, assumed: Assumed) -> _Begun:
     """Least squares on recordings, with gaps in their commands or without if that is likelier."""
     begun = _begun_with(method, runs, names, assumed)
-    if any(one.commands.lost for one in begun.models):
+    if any(model.commands.lost for model in begun.models):
         held = _begun_with(method, runs, names, assumed._replace(complete=True))
-        begun = min(begun, held, key=lambda one: one.criterion)
+        begun = min(begun, held, key=lambda start: start.criterion)
     return begun
 
 
@@ -363,7 +363,7 @@ def _begun_with(method: str, runs: Sequence[Run], names: _Names, assumed: Assume
     """Least squares on recordings whose commands are as `assumed`."""
     models = [commanded_model(run, names.common, assumed) for run in runs]
     _check_others(names.others, models[0].known)
-    rows, known = [one.rows for one in models], models[0].known
+    rows, known = [model.rows for model in models], models[0].known
     given = partial(_given, names, assumed, models, rows)
     first = [known[name] for name in names.others]
     white, found = native.FlightFit.first(given, first, known["delay"], known["gain"])
@@ -397,5 +397,5 @@ def _given(
     plant, values = models[0].plant, dict(zip(names.others, found, strict=True))
     if values:
         plant = plant._replace({**plant.parameters, **values})
-    within = [one.limited(part, values) for one, part in zip(models, rows, strict=True)]
+    within = [model.limited(part, values) for model, part in zip(models, rows, strict=True)]
     return plant_model(plant, names.linear, assumed.air == "vehicle"), within

@@ -125,7 +125,7 @@ class Waveform(Method):
             self.name,
             model,
             found,
-            [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)],
+            [Run(part.recording, run.loop) for part, run in zip(models, runs, strict=True)],
             message=f"least squares over {', '.join(names)} on the response of the loop",
             details={
                 "initial_output": float([*found.point, self.initial_output][len(names)]),
@@ -141,12 +141,12 @@ def _unlikelihood(fit: DelayEstimate) -> float:
     """
     if isinstance(fit._profile, FlightProfile):
         fitted = fit._profile.fit
-        air = any(one.air > 0.0 for one in fitted.numbers.noise)
-        return 0.5 * fitted.criterion + PRICE_OF_AIR * air
+        disturbed = any(noise.air > 0.0 for noise in fitted.numbers.noise)
+        return 0.5 * fitted.criterion + PRICE_OF_AIR * disturbed
     total = 0.0
-    for one in fit.runs:
-        scatter = max(float(np.std(one.residuals)), ROUNDING * excited(one.recording))
-        total += one.residuals.size * math.log(scatter)
+    for run in fit.runs:
+        scatter = max(float(np.std(run.residuals)), ROUNDING * excited(run.recording))
+        total += run.residuals.size * math.log(scatter)
     return total
 
 

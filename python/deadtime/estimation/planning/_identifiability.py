@@ -331,7 +331,7 @@ def identifiability(
     recording = experiment.run(loop)
     _check_excitation(run_loop, recording, names)
     seeds = np.random.SeedSequence(seed).spawn(count)
-    recordings = [experiment.run(loop, noise, one) for one in seeds] or [recording]
+    recordings = [experiment.run(loop, noise, number) for number in seeds] or [recording]
     asked = run_loop, names, offset, noise
     cases = {
         "command logged": partial(bound_with_command, *asked, recordings),

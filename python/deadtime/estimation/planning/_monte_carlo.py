@@ -187,14 +187,14 @@ def _summed_up(method: str, trials: Trials, outcomes: list[_Outcome]) -> MonteCa
     answered = [outcome for outcome in outcomes if not outcome.refusal]
     # Numbers are left out, so that equal reasons are counted together.
     refusals = [outcome.refusal for outcome in outcomes if outcome.refusal]
-    reasons = Counter(re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", one) for one in refusals)
+    reasons = Counter(re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", refusal) for refusal in refusals)
     if not answered:
         raise NotIdentifiableError(
             f"all {len(outcomes)} runs were refused. The most "
             f"frequent reason: {reasons.most_common(1)[0][0]}"
         )
     truth = {name: trials.truth[name] for name in answered[0].values}
-    estimates = {name: np.array([one.values[name] for one in answered]) for name in truth}
+    estimates = {name: np.array([run.values[name] for run in answered]) for name in truth}
     errors = {name: estimates[name] - truth[name] for name in truth}
     return MonteCarlo(
         method=method,
@@ -203,13 +203,13 @@ def _summed_up(method: str, trials: Trials, outcomes: list[_Outcome]) -> MonteCa
         estimates=estimates,
         rmse={name: float(np.sqrt(np.mean(error**2))) for name, error in errors.items()},
         bias={name: float(np.mean(error)) for name, error in errors.items()},
-        mean_bound=_means([one.bounds for one in answered]),
+        mean_bound=_means([run.bounds for run in answered]),
         level=trials.level,
-        coverage=_means([one.held for one in answered]),
+        coverage=_means([run.held for run in answered]),
         failures=dict(reasons.most_common()),
     )
 
 
 def _means(each: Sequence[Mapping[str, float]]) -> dict[str, float]:
     """The mean of each number over the runs."""
-    return {name: float(np.mean([one[name] for one in each])) for name in each[0]}
+    return {name: float(np.mean([run[name] for run in each])) for name in each[0]}

@@ -227,7 +227,7 @@ def bound_with_command(
             "a continuous loop changes its command between the samples of a log"
         )
     trim, time = trim_is_free(noise), recordings[0].time
-    slopes = [from_the_command(loop, one, names, offset, trim) for one in recordings]
+    slopes = [from_the_command(loop, recording, names, offset, trim) for recording in recordings]
     white = partial(in_open_loop, loop, time, noise=noise)
     return bound_of(slopes, white, names, noise, loop.plant)
 

@@ -88,12 +88,12 @@ class OnlineEstimate:
         }
 
     def __str__(self) -> str:
-        told = f"{self.time:.2f} s: {self.verdict}"
+        text = f"{self.time:.2f} s: {self.verdict}"
         if self.known:
-            told += f": delay {claimed(self.verdict, self.delay, self.stderr, 's')}"
+            text += f": delay {claimed(self.verdict, self.delay, self.stderr, 's')}"
         if self.verdict == "reliable":
-            told += f", 95 %: {between(*self.ci, self.stderr, 's')}"
-        return f"{told}; {self.message}" if self.message else told
+            text += f", 95 %: {between(*self.ci, self.stderr, 's')}"
+        return f"{text}; {self.message}" if self.message else text
 
 
 def reasons_against(numbers: BankAnswer, white: float, range_: tuple[float, float]) -> list[str]:

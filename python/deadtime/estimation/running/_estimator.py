@@ -165,8 +165,8 @@ class OnlineEstimator:
             delays=points.tolist(),
             follow=settings.is_range(delays),
             layers=[
-                (one, model.zero, [0.0] * points.size)
-                for one in settings.lag_sets(model, self._lags)
+                (tau, model.zero, [0.0] * points.size)
+                for tau in settings.lag_sets(model, self._lags)
             ],
             gain=(float(known or 1.0), 0.5 * size) if gain is None else gain,
             memory=positive("memory", memory),

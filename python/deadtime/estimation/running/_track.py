@@ -81,13 +81,13 @@ class DelayTrack(ReadOnlyArrays):
         if not estimates:
             raise ValueError("there are no estimates: give one or more")
 
-        ends = np.array([one.ci for one in estimates])
+        ends = np.array([estimate.ci for estimate in estimates])
         columns: dict[str, Any] = {
-            name: np.array([getattr(one, name) for one in estimates], dtype=kind)
+            name: np.array([getattr(estimate, name) for estimate in estimates], dtype=kind)
             for names, kind in ((NUMBERS, float), (MARKS, bool))
             for name in names
         }
-        columns["reliable"] = np.array([one.verdict == "reliable" for one in estimates])
+        columns["reliable"] = np.array([estimate.verdict == "reliable" for estimate in estimates])
         return cls(low=ends[:, 0], high=ends[:, 1], last=estimates[-1], **columns)
 
     def __len__(self) -> int:

@@ -33,7 +33,7 @@ class LinkAddress:
     LinkAddress(kind='tcp', host='127.0.0.1', port=5760)
     >>> LinkAddress.of("udp:14550").loopback
     True
-    >>> [str(one) for one in LinkAddress.all_of("udp:14550,serial:/dev/ttyUSB0:57600")]
+    >>> [str(address) for address in LinkAddress.all_of("udp:14550,serial:/dev/ttyUSB0:57600")]
     ['udp:127.0.0.1:14550', 'serial:/dev/ttyUSB0:57600']
     """
 
@@ -75,7 +75,7 @@ class LinkAddress:
         ValueError
             If one is none, or given twice.
         """
-        found = tuple(cls.of(one) for one in text.split(","))
+        found = tuple(cls.of(address) for address in text.split(","))
         if len(set(found)) < len(found):
             raise ValueError(f"the addresses {text!r} contain a link twice: give each link once")
         return found

@@ -109,9 +109,9 @@ class Autopilot(ABC):
         LinkError
             If it does not answer for a setting.
         """
-        for one in self.speeds if kind == "position" else ():
-            most = max(one.least, getattr(limits, one.limit) / one.factor)
-            await _at_most(parameters, most, one.name)
+        for speed in self.speeds if kind == "position" else ():
+            most = max(speed.least, getattr(limits, speed.limit) / speed.factor)
+            await _at_most(parameters, most, speed.name)
 
     @abstractmethod
     def mode(self, custom: int) -> tuple[float, ...]:

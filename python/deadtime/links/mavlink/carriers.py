@@ -62,14 +62,14 @@ class Carriers:
     @property
     def other_vehicles(self) -> list[Carrier]:
         """Links over which another vehicle answers than over the one in use."""
-        return [one for one in self._all if not _same_clock(one, self.current)]
+        return [carrier for carrier in self._all if not _same_clock(carrier, self.current)]
 
     def look(self) -> None:
         """Name links that have fallen silent, and use another one if the one in use has."""
         alive = [
-            one
-            for one in self._all
-            if one.heard is not None and one.silent < SILENT and _same_clock(one, self.current)
+            link
+            for link in self._all
+            if link.heard is not None and link.silent < SILENT and _same_clock(link, self.current)
         ]
         patience = FIRST if self.current.heard is None else SILENT
         if not self._held and self.current.silent > patience and alive:
@@ -80,13 +80,13 @@ class Carriers:
                 f"{lost.address}: nothing has been received for {lost.silent:.1f} s. The "
                 f"vehicle is now reached over {best.address}"
             )
-        for one in self._all:
-            if one in alive:
-                one.named = False
-            elif one is not self.current and one.silent > NAMED and not one.named:
-                one.named = True
+        for link in self._all:
+            if link in alive:
+                link.named = False
+            elif link is not self.current and link.silent > NAMED and not link.named:
+                link.named = True
                 self._tell(
-                    f"{one.address}: nothing has been received for {one.silent:.1f} s. This "
+                    f"{link.address}: nothing has been received for {link.silent:.1f} s. This "
                     "link was in reserve"
                 )
 
@@ -107,9 +107,9 @@ class Carriers:
             self._switched()
 
 
-def _same_clock(one: Carrier, other: Carrier) -> bool:
+def _same_clock(carrier: Carrier, other: Carrier) -> bool:
     """Whether the vehicle at both may be the same one."""
-    some, others = one.time_sync.link_time, other.time_sync.link_time
+    some, others = carrier.time_sync.link_time, other.time_sync.link_time
     if some is None or others is None:
         return True
     return abs(some.offset - others.offset) <= 0.5 * (some.least + others.least) + APART

@@ -82,8 +82,8 @@ class ChangedParameters:
         try:
             text = json.loads(path.read_text(encoding="utf-8"))
             changes = {
-                printable(str(name)): Change(float(one["before"]), float(one["set"]))
-                for name, one in text["parameters"].items()
+                printable(str(name)): Change(float(change["before"]), float(change["set"]))
+                for name, change in text["parameters"].items()
             }
             board = text["vehicle"]
             vehicle = VehicleId(str(board["autopilot"]), int(board["system"]), str(board["unique"]))
@@ -100,8 +100,8 @@ class ChangedParameters:
         """
         places = [Path()] if folder is None else [folder, folder.absolute().parent]
         found = (cls.read(path) for path in dict.fromkeys(_candidates(vehicle, places)))
-        mine = [one for one in found if one is not None and one.vehicle.may_be(vehicle)]
-        return sorted(mine, key=lambda one: one.written)
+        mine = [record for record in found if record is not None and record.vehicle.may_be(vehicle)]
+        return sorted(mine, key=lambda record: record.written)
 
     def save(self) -> None:
         """Write the file, or remove it where nothing is changed.

@@ -151,7 +151,7 @@ giving commands
     @property
     def foreign(self) -> list[str]:
         """Who else sends on this link, in words; their messages are ignored."""
-        return [f"{one} ({one.frames} frames)" for one in self._link.senders.foreign.values()]
+        return [f"{other} ({other.frames} frames)" for other in self._link.senders.foreign.values()]
 
     @property
     def autopilot(self) -> str:

@@ -84,8 +84,8 @@ class Connection:
         self.take: Callable[[Any, float], None] = lambda message, time: None
         self.switched: Callable[[], None] = lambda: None
         links = [
-            Carrier(one, Codec(system, component, key, number), self.senders, self._receive)
-            for number, one in enumerate(addresses)
+            Carrier(address, Codec(system, component, key, number), self.senders, self._receive)
+            for number, address in enumerate(addresses)
         ]
         self.carriers = Carriers(links, _warn, lambda: self.switched())
         self._waiting: list[tuple[Callable[[Any], bool], asyncio.Future[Any]]] = []
@@ -122,8 +122,8 @@ class Connection:
             If one cannot be opened.
         """
         try:
-            for one in self.carriers:
-                await one.open()
+            for carrier in self.carriers:
+                await carrier.open()
         except BaseException:
             self.shut()
             raise
@@ -140,13 +140,13 @@ class Connection:
         for task in self._tasks:
             task.cancel()
         self._tasks = []
-        for one in self.carriers:
-            one.close()
+        for carrier in self.carriers:
+            carrier.close()
 
     async def _every(self, period: float, send: Callable[[Carrier], None]) -> None:
         while True:
-            for one in self.carriers:
-                send(one)
+            for carrier in self.carriers:
+                send(carrier)
             await asyncio.sleep(period)
 
     async def _look(self) -> None:

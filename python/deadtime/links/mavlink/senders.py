@@ -69,33 +69,35 @@ class Senders:
     def _count(self, message: Any, system: int, component: int) -> None:
         if (system, component) not in self.foreign and len(self.foreign) >= MOST:
             return
-        one = self.foreign.setdefault((system, component), Foreign(system, component))
-        one.frames += 1
+        sender = self.foreign.setdefault((system, component), Foreign(system, component))
+        sender.frames += 1
         if message.get_type() == "HEARTBEAT":
             d = dialect()
             if is_autopilot(message):
-                one.kind = "another vehicle"
+                sender.kind = "another vehicle"
             elif message.type == d.MAV_TYPE_GCS:
-                one.kind = "another ground station"
+                sender.kind = "another ground station"
                 if (system, component) == self.own:
-                    one.kind = "another ground station with the same ids as this program"
+                    sender.kind = "another ground station with the same ids as this program"
             else:
-                one.kind = "another component"
+                sender.kind = "another component"
 
     @property
     def ground_stations(self) -> list[Foreign]:
         """Other ground stations."""
-        return [one for one in self.foreign.values() if "ground station" in one.kind]
+        return [sender for sender in self.foreign.values() if "ground station" in sender.kind]
 
     @property
     def named(self) -> str:
         """Other ground stations as a clause, or nothing."""
-        return "".join(f". Another sender on the link is {one}" for one in self.ground_stations)
+        return "".join(
+            f". Another sender on the link is {station}" for station in self.ground_stations
+        )
 
     @property
     def vehicles(self) -> list[Foreign]:
         """Other vehicles."""
-        return [one for one in self.foreign.values() if one.kind == "another vehicle"]
+        return [sender for sender in self.foreign.values() if sender.kind == "another vehicle"]
 
 
 def is_autopilot(message: Any) -> bool:

@@ -119,7 +119,7 @@ class Settings(Commanding):
                 points.give_up(self._authority.lost)
         elif kind == "POSITION_TARGET_LOCAL_NED" and pilot.echoes:
             if points.are_not(echo := echo_of(message, time)):
-                speeds = ", ".join(f"{one:g}" for one in echo[2:] if one is not None)
+                speeds = ", ".join(f"{speed:g}" for speed in echo[2:] if speed is not None)
                 self._give_up(
                     f"the vehicle follows a setpoint of {speeds} m/s, which this program has not "
                     "sent"

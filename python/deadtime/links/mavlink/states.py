@@ -222,7 +222,7 @@ class StateReader:
     @property
     def _attitude(self) -> Any:
         """The newest attitude; one that is not finite counts only after another such one."""
-        finite = [one for one in self._attitudes if _is_finite(one)]
+        finite = [attitude for attitude in self._attitudes if _is_finite(attitude)]
         return (finite or [*self._attitudes, None])[-1]
 
     @property
@@ -257,7 +257,7 @@ def _heading(attitude: Any, stamp: float) -> float | None:
 
 def echo_of(message: Any, time: float) -> Echo:
     """What a POSITION_TARGET_LOCAL_NED that arrived at a time, s, says."""
-    speeds = (_finite(one) for one in (message.vx, message.vy, -message.vz))
+    speeds = (_finite(speed) for speed in (message.vx, message.vy, -message.vz))
     return Echo(time, 1e-3 * message.time_boot_ms, *speeds)
 
 

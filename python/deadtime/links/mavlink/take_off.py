@@ -47,10 +47,10 @@ async def ask_for_messages(link: Connection, pilot: Autopilot, anew: bool = Fals
 async def ask_over_all(link: Connection, pilot: Autopilot) -> None:
     """Ask on every link on which the vehicle is heard: on each comes what was asked for there."""
     current = link.carriers.current
-    for one in link.carriers:
-        if one is not current and one.heard is not None:
+    for carrier in link.carriers:
+        if carrier is not current and carrier.heard is not None:
             # Where it falls silent, it is named.
-            with link.carriers.over(one), suppress(LinkError):
+            with link.carriers.over(carrier), suppress(LinkError):
                 await ask_for_messages(link, pilot, anew=True)
     await ask_for_messages(link, pilot)
 

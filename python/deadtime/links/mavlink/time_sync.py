@@ -85,7 +85,7 @@ class TimeSync:
         if not self._answers:
             return None
         trips = [trip for _, trip, _ in self._answers]
-        offset = min(self._answers, key=lambda one: one[1])[2]
+        offset = min(self._answers, key=lambda answer: answer[1])[2]
         return LinkTime(
             min(trips), median(trips), fmean(trips), self._count, self._lost, round(offset, 9)
         )

@@ -158,10 +158,10 @@ class Controller(LoopEnd):
             elif packet.sequence > self._newest:
                 fresh.append((packet, read))
             else:
-                statistics.came_late(self._lateness(packet))
+                statistics.add_late(self._lateness(packet))
         if not fresh:
             return
-        packet, read = max(fresh, key=lambda one: one[0].sequence)
+        packet, read = max(fresh, key=lambda arrival: arrival[0].sequence)
         self._drained += len(fresh) - 1
         self._answer(packet, read)
 

@@ -188,11 +188,11 @@ class Path:
             arrivals.append((self._arrival(leaves), packet))
         if self.network.reversed_groups == 1:
             return arrivals
-        self._kept += [one for _, one in arrivals]
+        self._kept += [copy for _, copy in arrivals]
         if len(self._kept) < self.network.reversed_groups:
             return []
         last = max(time for time, _ in arrivals)
-        released = [(last, one) for one in reversed(self._kept)]
+        released = [(last, kept) for kept in reversed(self._kept)]
         self._kept = []
         return released
 

@@ -165,14 +165,14 @@ class Plant(LoopEnd):
             self._echo = (packet, read)
             self._arrivals.append((number, age))
             if age > self.options.watchdog:
-                statistics.came_late(age - self.options.watchdog)
+                statistics.add_late(age - self.options.watchdog)
                 return
         if number <= self._newest:
-            statistics.came_late(self._behind(age))
+            statistics.add_late(self._behind(age))
             return
         wait = self.options.policy.wait(age)
         if wait is None:
-            statistics.came_late(age - self.options.policy.oldest)
+            statistics.add_late(age - self.options.policy.oldest)
             return
         if wait == 0.0:
             self._apply(packet, number)

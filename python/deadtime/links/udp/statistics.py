@@ -263,7 +263,7 @@ class LinkStatistics:
         self.round_trips.append((now - packet.echo_sent) - packet.held)
         self.clock.add(*times)
 
-    def came_late(self, by: float) -> None:
+    def add_late(self, by: float) -> None:
         """Count a packet that could not be used, with its lateness in s."""
         self.late += 1
         self.lateness.append(by)

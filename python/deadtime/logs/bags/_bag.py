@@ -132,12 +132,12 @@ class Bag:
         series = {
             signal: _series(rows[signal], used, self._first, named[signal]) for signal in named
         }
-        told, came = series["command"], series["output"]
-        for signal, one in series.items():
-            if not len(one) or not np.isfinite(one.values).any():
+        commands, outputs = series["command"], series["output"]
+        for signal, samples in series.items():
+            if not len(samples) or not np.isfinite(samples.values).any():
                 raise RecordingError(f"{named[signal]} contains no number in {self.source}")
         name = f"{self.source}, {why}"
-        return recording_of(name, series.get("reference"), came, told, (None, None))
+        return recording_of(name, series.get("reference"), outputs, commands, (None, None))
 
     def _place(self, name: str) -> tuple[str, str]:
         """Topic and field of a name, or an error with those that exist."""
@@ -223,7 +223,7 @@ def _stamps(
     rows: Mapping[str, _Rows], places: Mapping[str, tuple[str, str]], asked: Stamps | None
 ) -> tuple[Stamps, str]:
     """Which times are used, and why."""
-    without = sorted({places[signal][0] for signal, one in rows.items() if not one.has_stamps})
+    without = sorted({places[signal][0] for signal, topic in rows.items() if not topic.has_stamps})
     if without and asked == "header":
         raise RecordingError(
             f"the headers of {', '.join(without)} contain no time, so stamps='header' is not "
@@ -235,7 +235,7 @@ def _stamps(
         return "received", (
             f"by the times of reception, because {', '.join(without)} has no other times"
         )
-    ages = [one.age() for one in rows.values()]
+    ages = [topic.age() for topic in rows.values()]
     if max(ages) - min(ages) > ONE_CLOCK:
         return "received", (
             "by the times of reception, because the times in the headers come from different clocks"
@@ -267,7 +267,7 @@ def bag_of(
     remarks: Iterable[str],
 ) -> Bag:
     """A bag of its topics in the order of their names."""
-    named = {topic.name: topic for topic in sorted(topics, key=lambda one: one.name)}
+    named = {topic.name: topic for topic in sorted(topics, key=lambda topic: topic.name)}
     if not named:
         raise RecordingError(f"{source} is a {form} without a message that can be read")
     first, last = ends

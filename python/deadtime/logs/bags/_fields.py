@@ -35,11 +35,11 @@ def _walk(value: Any, path: str, depth: int) -> Iterator[tuple[str, Any]]:
         return
     elif isinstance(value, (Sequence, np.ndarray)):
         if len(value) <= LONGEST_ARRAY:
-            for k, one in enumerate(value):
-                yield from _walk(one, f"{path}[{k}]", depth + 1)
+            for k, item in enumerate(value):
+                yield from _walk(item, f"{path}[{k}]", depth + 1)
     else:
-        for name, one in _named(value).items():
-            yield from _walk(one, f"{path}.{name}" if path else name, depth + 1)
+        for name, item in _named(value).items():
+            yield from _walk(item, f"{path}.{name}" if path else name, depth + 1)
 
 
 def _named(message: Any) -> Mapping[str, Any]:

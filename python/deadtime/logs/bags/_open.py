@@ -68,13 +68,13 @@ def open_bag(path: str | os.PathLike[str]) -> Bag:
     ...     log.start()
     ...     number = log.register_channel("/speed", "json", schema_id=0)
     ...     for k in range(20):
-    ...         at, row = k * 50_000_000, json.dumps({"asked": float(k > 5), "came": float(k > 7)})
+    ...         at, row = k * 50_000_000, json.dumps({"asked": float(k > 5), "value": float(k > 7)})
     ...         log.add_message(number, at, row.encode(), at)
     ...     log.finish()
     >>> bag = deadtime.logs.open_bag(path)
     >>> bag.topics["/speed"].fields
-    ('asked', 'came')
-    >>> len(bag.recording("/speed:asked", "/speed:came"))
+    ('asked', 'value')
+    >>> len(bag.recording("/speed:asked", "/speed:value"))
     20
     """
     from deadtime.logs.bags._mcap import read_mcap

@@ -47,12 +47,12 @@ class _RosBag:
             chosen: list[Any] = reader.connections
             if wanted is not None:
                 names = set(wanted)
-                chosen = [one for one in chosen if one.topic in names]
+                chosen = [channel for channel in chosen if channel.topic in names]
             if not chosen:
                 return
-            for one, received, data in reader.messages(connections=chosen):
-                self.types.setdefault(one.topic, one.msgtype)
-                yield one.topic, received, partial(reader.deserialize, data, one.msgtype)
+            for channel, received, data in reader.messages(connections=chosen):
+                self.types.setdefault(channel.topic, channel.msgtype)
+                yield channel.topic, received, partial(reader.deserialize, data, channel.msgtype)
 
 
 def read_ros(path: str | os.PathLike[str], form: str) -> Bag:

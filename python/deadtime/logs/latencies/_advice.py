@@ -84,13 +84,13 @@ def advice(log: Log, loops: Iterable[str] | None = None) -> tuple[Advice, ...]:
     >>> lines += [f"ATT, {k * 100000}, {k % 20 // 10}, {(k - 1) % 20 // 10}" for k in range(80)]
     >>> _ = file.write_text("\n".join(lines))
     >>> log = dtm.open_log(file)
-    >>> [one.text.partition(":")[0] for one in dtm.logs.advice(log)]
+    >>> [suggestion.text.partition(":")[0] for suggestion in dtm.logs.advice(log)]
     ['roll']
     """
     chosen = list(log.loops.values()) if loops is None else [log.loop(name) for name in loops]
     facts = Facts(log, chosen, promises_of(log))
     rules = RULES.get(log.autopilot)
-    found = [Advice(*one) for one in rules(facts)] if rules else []
+    found = [Advice(*entry) for entry in rules(facts)] if rules else []
     if (loop := facts.worst()) is not None:
         found.append(Advice(_flown(loop, facts), ""))
     return tuple(found[:LINES])
@@ -165,7 +165,7 @@ def _ardupilot(facts: Facts) -> Said:
         yield words, "ArduPilot: Parameters, LOG_FILE_RATEMAX"
     if facts.worst(*SID_AXES) is not None and facts.version >= SYSTEM_ID and not facts.plane:
         yield _sid(facts), "ArduPilot: System ID Mode Operation"
-    if facts.lacks("LOG_BITMASK", RAW_IMU) and any(one.kind == "rate" for one in facts.loops):
+    if facts.lacks("LOG_BITMASK", RAW_IMU) and any(loop.kind == "rate" for loop in facts.loops):
         words = (
             f"{_with('LOG_BITMASK', FAST | RAW_IMU, facts)}, to log also the raw IMU that the "
             "filters read"

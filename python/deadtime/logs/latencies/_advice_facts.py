@@ -64,7 +64,7 @@ class Facts(NamedTuple):
             if loop.name in self.promises and (not names or loop.name in names)
         ]
         poor = [(loop, share) for loop, share in known if share > WANTED]
-        return max(poor, key=lambda one: (math.isfinite(one[1]), one[1]))[0] if poor else None
+        return max(poor, key=lambda pair: (math.isfinite(pair[1]), pair[1]))[0] if poor else None
 
 
 def share_of(promise: Promise) -> float:

@@ -43,39 +43,39 @@ def below(
     lines = [_left_out(loops, others), _spread(loops)]
     lines += [*_groups(loops, "indication")[:1], _contradicted(loops), *_without(loops, others)]
     lines = [line for line in lines if line][: LINES - min(ADVICE, len(advice))]
-    more = [shortened("next: ", one.text) for one in advice]
+    more = [shortened("next: ", suggestion.text) for suggestion in advice]
     return [*lines, *more[: LINES - len(lines)]]
 
 
 def refused_of(loops: Sequence[LoopLatency]) -> list[tuple[str, str]]:
     """The names of the loops without a time that share a reason, and the whole reason."""
     groups: dict[str, list[LoopLatency]] = {}
-    for one in loops:
-        if one.verdict == "none":
-            groups.setdefault(one.reason, []).append(one)
+    for loop in loops:
+        if loop.verdict == "none":
+            groups.setdefault(loop.reason, []).append(loop)
     return [(names_of(some, len(some)), reason) for reason, some in groups.items()]
 
 
 def shortened(before: str, text: str, after: str = "") -> str:
     """Words with a text between, of which as many parts are kept as fit on a screen."""
-    room = SCREEN - len(before) - len(after)
-    if len(text) > room:
+    width = SCREEN - len(before) - len(after)
+    if len(text) > width:
         ends = [end.start() for end in _ENDS.finditer(text)]
-        text = text[: max([end for end in ends if end <= room], default=min(ends, default=None))]
+        text = text[: max([end for end in ends if end <= width], default=min(ends, default=None))]
     return f"{before}{text}{after}"
 
 
 def grouped(loops: Sequence[LoopLatency]) -> list[list[LoopLatency]]:
     """Loops that share the first of their reasons, the largest group first."""
     groups: dict[str, list[LoopLatency]] = {}
-    for one in loops:
-        groups.setdefault(_NUMBERS.sub("#", first_reason(one)), []).append(one)
+    for loop in loops:
+        groups.setdefault(_NUMBERS.sub("#", first_reason(loop)), []).append(loop)
     return sorted(groups.values(), key=len, reverse=True)
 
 
-def first_reason(one: LoopLatency) -> str:
+def first_reason(loop: LoopLatency) -> str:
     """The first reason why a time is not reliable; the one that leaves out most of the log."""
-    parts = one.reason.split("; ")
+    parts = loop.reason.split("; ")
     left_out = [found for found in map(_LEFT_OUT.fullmatch, parts) if found]
     if not left_out:
         return parts[0]
@@ -85,8 +85,8 @@ def first_reason(one: LoopLatency) -> str:
 def names_of(loops: Sequence[LoopLatency], most: int = NAMED) -> str:
     """Names of loops: ``"roll, pitch"``, or ``"roll; from actuator pitch"`` of what is not both."""
     commands: dict[str, list[str]] = {}
-    for one in loops:
-        commands.setdefault(one.loop, []).append(one.command)
+    for loop in loops:
+        commands.setdefault(loop.loop, []).append(loop.command)
     alone = [name for name, some in commands.items() if some == ["actuator"]]
     first = [name for name in commands if name not in alone]
     left = max(most - len(first), 0)
@@ -100,10 +100,10 @@ def names_of(loops: Sequence[LoopLatency], most: int = NAMED) -> str:
 def _groups(loops: Sequence[LoopLatency], verdict: Verdict) -> list[str]:
     """A line for the loops of a verdict that share a reason, whose numbers are of the first."""
     lines = []
-    for alike in grouped([one for one in loops if one.verdict == verdict]):
+    for alike in grouped([loop for loop in loops if loop.verdict == verdict]):
         reason = first_reason(alike[0])
-        same = [one for one in alike if first_reason(one) == reason]
-        others = [one for one in alike if first_reason(one) != reason]
+        same = [loop for loop in alike if first_reason(loop) == reason]
+        others = [loop for loop in alike if first_reason(loop) != reason]
         after = f"; likewise {names_of(others)}" if others else ""
         lines.append(shortened(f"{verdict}: {names_of(same)}: ", reason, after))
     return lines
@@ -112,19 +112,19 @@ def _groups(loops: Sequence[LoopLatency], verdict: Verdict) -> list[str]:
 def _contradicted(loops: Sequence[LoopLatency]) -> str:
     """Where a plain number contradicts the fit, unless that is the first reason of its loop."""
     found = []
-    for one in loops:
-        reasons = [each for each in one.reason.split("; ") if CONTRADICTED in each]
-        if one.verdict == "indication" and reasons and reasons[0] != first_reason(one):
-            found.append(replace(one, reason=reasons[0]))
+    for loop in loops:
+        reasons = [each for each in loop.reason.split("; ") if CONTRADICTED in each]
+        if loop.verdict == "indication" and reasons and reasons[0] != first_reason(loop):
+            found.append(replace(loop, reason=reasons[0]))
     return next(iter(_groups(found, "indication")), "")
 
 
 def _without(loops: Sequence[LoopLatency], others: str) -> list[str]:
     """The lines on loops without a time, those first that were fitted, then those tried."""
-    none = [one for one in loops if one.verdict == "none"]
-    fitted = [one for one in none if one.windows]
-    tried = [one for one in none if not one.windows and one.sampling is not None]
-    rest = [one for one in none if not one.windows and one.sampling is None]
+    none = [loop for loop in loops if loop.verdict == "none"]
+    fitted = [loop for loop in none if loop.windows]
+    tried = [loop for loop in none if not loop.windows and loop.sampling is not None]
+    rest = [loop for loop in none if not loop.windows and loop.sampling is None]
     lines = [line for some in (fitted, tried, rest) for line in _groups(some, "none")]
     if len(lines) > NONES:
         lines = [*lines[: NONES - 1], f"{lines[NONES - 1]}; for others: {others}"]
@@ -133,31 +133,31 @@ def _without(loops: Sequence[LoopLatency], others: str) -> list[str]:
 
 def _left_out(loops: Sequence[LoopLatency], others: str) -> str:
     """How many times had no room in the table."""
-    count = sum(one.verdict != "none" for one in loops) - ROWS
+    count = sum(loop.verdict != "none" for loop in loops) - ROWS
     return f"{count} more time{'' if count == 1 else 's'}: {others}" if count > 0 else ""
 
 
 def _spread(loops: Sequence[LoopLatency]) -> str:
     """How the time of a loop changes with the size of the movement, or between windows."""
     slopes, differ = [], []
-    for one in loops:
-        if one.verdict == "none" or one.spread is None:
+    for loop in loops:
+        if loop.verdict == "none" or loop.spread is None:
             continue
-        if (halved := one.spread.halved()) is not None:
-            slopes.append((abs(halved[0]) / one.time, halved, one))
-        elif one.spread.p_value < DIFFER:
-            differ.append((one.spread.between / one.time, one.spread.between, one))
+        if (halved := loop.spread.halved()) is not None:
+            slopes.append((abs(halved[0]) / loop.time, halved, loop))
+        elif loop.spread.p_value < DIFFER:
+            differ.append((loop.spread.between / loop.time, loop.spread.between, loop))
     if slopes:
-        _, (change, error), one = max(slopes, key=lambda each: each[0])
+        _, (change, error), loop = max(slopes, key=lambda each: each[0])
         way = "longer" if change > 0.0 else "less"
         return (
-            f"{names_of([one])} takes {stated(abs(change), error, 's')} {way} if the "
-            f"{one.command} moves half as much"
+            f"{names_of([loop])} takes {stated(abs(change), error, 's')} {way} if the "
+            f"{loop.command} moves half as much"
         )
     if differ:
-        _, between, one = max(differ, key=lambda each: each[0])
+        _, between, loop = max(differ, key=lambda each: each[0])
         return (
-            f"{names_of([one])}: the time changes during the log, with a standard deviation of "
+            f"{names_of([loop])}: the time changes during the log, with a standard deviation of "
             f"{about(between, 's')} between windows"
         )
     return ""

@@ -44,7 +44,7 @@ def beside_plain_numbers(found: LoopLatency, loop: LogLoop, sampling: Sampling) 
     own = plain_times(*both, loop.segments, longest=longest, between=between)
     if fit is None or fit.plant is None:
         return replace(found, plain=own)
-    if ahead := [one for one in own.all if one.interval[1] < 0.0]:
+    if ahead := [plain for plain in own.all if plain.interval[1] < 0.0]:
         return _without_time(found, own, _why_ahead(ahead[0]))
     asked, late = loop.setpoint, 0.0
     if between == "straight":
@@ -60,8 +60,8 @@ def beside_plain_numbers(found: LoopLatency, loop: LogLoop, sampling: Sampling) 
     differ = differences(own, of_fit)
     found = replace(found, plain=own, differences=differ, answered=of_fit.aligned)
     half = 0.5 * (found.interval[1] - found.interval[0])
-    for one in differ:
-        if why := _why_apart(one, half):
+    for difference in differ:
+        if why := _why_different(difference, half):
             found = found.doubted(why)
     return found
 
@@ -74,27 +74,27 @@ def _without_time(found: LoopLatency, own: PlainTimes, why: str) -> LoopLatency:
     )  # fmt: skip
 
 
-def _why_ahead(one: PlainTime) -> str:
+def _why_ahead(time: PlainTime) -> str:
     """How far the response precedes its setpoint by a plain number."""
-    low, high = one.interval
+    low, high = time.interval
     error = 0.25 * (high - low)
     return (
-        f"by {one.name} the response comes {shown(-one.value, error, 's')} before "
+        f"by {time.name} the response comes {shown(-time.value, error, 's')} before "
         f"its setpoint (95 %: {ends_of(-high, -low, error, 's')})"
     )
 
 
-def _why_apart(one: Difference, half: float) -> str:
+def _why_different(difference: Difference, half: float) -> str:
     """How far a plain number is from that of the fit; empty where it may be the same.
 
     `half` is half the interval of the time of the fit, s.
     """
-    low, high = one.interval
-    apart = abs(one.measured - one.modelled)
-    if not (one.disagrees and apart > math.hypot(0.5 * (high - low), half)):
+    low, high = difference.interval
+    distance = abs(difference.measured - difference.modelled)
+    if not (difference.disagrees and distance > math.hypot(0.5 * (high - low), half)):
         return ""
     error = 0.25 * (high - low)
     return (
-        f"by {one.name} {CONTRADICTED} {shown(one.measured, error, 's')}, but the "
-        f"fit gives {shown(one.modelled, error, 's')}"
+        f"by {difference.name} {CONTRADICTED} {shown(difference.measured, error, 's')}, but the "
+        f"fit gives {shown(difference.modelled, error, 's')}"
     )

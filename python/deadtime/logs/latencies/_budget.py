@@ -64,7 +64,7 @@ def stages_of(
     controller commands to the response it is: filters are computed, and the rest is that
     of actuators and airframe.
     """
-    own = {one.command: one for one in relations if one.loop == loop and one.verdict != "none"}
+    own = {fit.command: fit for fit in relations if fit.loop == loop and fit.verdict != "none"}
     stages = []
     if "setpoint" in own:
         stages.append(_measured(own["setpoint"], "setpoint to response, with the loop closed"))
@@ -75,8 +75,8 @@ def stages_of(
     stages.append(whole)
     if vehicle.kind != "rate":
         return tuple(stages)
-    known = [one for one in filters if one.path == "response"]
-    stages += [Stage(one.name, one.delay, 0.0, one.source, part=True) for one in known]
+    known = [part for part in filters if part.path == "response"]
+    stages += [Stage(part.name, part.delay, 0.0, part.source, part=True) for part in known]
     computed = math.fsum(stage.time for stage in stages if stage.part)
     if computed > 0.0:
         rest = whole.time - computed
@@ -89,10 +89,10 @@ def stages_of(
     return tuple(stages)
 
 
-def _measured(one: LoopLatency, name: str) -> Stage:
-    start, stop = one.windows[0]
+def _measured(loop: LoopLatency, name: str) -> Stage:
+    start, stop = loop.windows[0]
     where = f"estimated from {start:.1f} to {stop:.1f} s"
-    if len(one.windows) > 1:
-        more = len(one.windows) - 1
+    if len(loop.windows) > 1:
+        more = len(loop.windows) - 1
         where += f" and {more} more window{'s' if more > 1 else ''}"
-    return Stage(name, one.time, one.stderr, where, one.verdict)
+    return Stage(name, loop.time, loop.stderr, where, loop.verdict)

@@ -97,13 +97,13 @@ def compare_latencies(before: Latency, after: Latency) -> tuple[LatencyChange, .
     >>> import numpy as np
     >>> import deadtime as dtm
     >>> time = np.arange(600) * 0.01
-    >>> told = np.where(time < 0.3, 0.0, 0.2 * np.sign(np.sin(3.7 * (time - 0.3))))
+    >>> command = np.where(time < 0.3, 0.0, 0.2 * np.sign(np.sin(3.7 * (time - 0.3))))
     >>> noise = 0.003 * np.random.default_rng(1).standard_normal((2, 600))
     >>> found = []
-    >>> for delay, one in zip((0.03, 0.05), noise):
+    >>> for delay, error in zip((0.03, 0.05), noise):
     ...     vehicle = dtm.FactoredPlant([0.08]).transfer_function() * dtm.delay(delay)
-    ...     angle = np.ravel(vehicle.simulate(time, told).outputs) + one
-    ...     found.append(dtm.latency(dtm.Recording(time, told, angle)))
+    ...     angle = np.ravel(vehicle.simulate(time, command).outputs) + error
+    ...     found.append(dtm.latency(dtm.Recording(time, command, angle)))
     >>> (change,) = dtm.logs.compare_latencies(*found)
     >>> low, high = change.ci
     >>> low < 0.02 < high, change.p_value < 0.05
@@ -112,35 +112,35 @@ def compare_latencies(before: Latency, after: Latency) -> tuple[LatencyChange, .
     from scipy import special
 
     found = []
-    for one in before.estimated:
+    for earlier in before.estimated:
         for other in after.estimated:
-            if (one.loop, one.command) != (other.loop, other.command):
+            if (earlier.loop, earlier.command) != (other.loop, other.command):
                 continue
-            seen = _seen_by_both(one, other)
+            seen = _seen_by_both(earlier, other)
             (first, first_error), (second, second_error) = (
-                _at(seen, each) for each in (one, other)
+                _at(seen, each) for each in (earlier, other)
             )
             spread = math.hypot(first_error, second_error)
             z = abs(second - first) / spread if spread > 0.0 else math.inf
-            reliable = one.verdict == other.verdict == "reliable"
+            reliable = earlier.verdict == other.verdict == "reliable"
             found.append(
                 LatencyChange(
-                    one.loop, one.command, first, first_error, second, second_error,
+                    earlier.loop, earlier.command, first, first_error, second, second_error,
                     float(2.0 * special.ndtr(-z)), verdict_if(reliable),
                 )
             )  # fmt: skip
     return tuple(found)
 
 
-def _seen_by_both(one: LoopLatency, other: LoopLatency) -> Frequencies:
+def _seen_by_both(first: LoopLatency, second: LoopLatency) -> Frequencies:
     """Where the responses of both move, each with half of the weight."""
-    omega = np.concatenate([one.frequencies, other.frequencies])
-    return Frequencies(omega, 0.5 * np.concatenate([one.weights, other.weights]))
+    omega = np.concatenate([first.frequencies, second.frequencies])
+    return Frequencies(omega, 0.5 * np.concatenate([first.weights, second.weights]))
 
 
-def _at(seen: Frequencies, one: LoopLatency) -> tuple[float, float]:
+def _at(seen: Frequencies, loop: LoopLatency) -> tuple[float, float]:
     """The time of a loop at other frequencies, and its standard error, s."""
-    assert one.estimate is not None
-    value, (low, high) = one.estimate.mean_delay(*seen)
-    own, _ = one.estimate.mean_delay(one.frequencies, one.weights)
-    return one.time + value - own, max(one.stderr, (high - low) / TWO_SIDED)
+    assert loop.estimate is not None
+    value, (low, high) = loop.estimate.mean_delay(*seen)
+    own, _ = loop.estimate.mean_delay(loop.frequencies, loop.weights)
+    return loop.time + value - own, max(loop.stderr, (high - low) / TWO_SIDED)

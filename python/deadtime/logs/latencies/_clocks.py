@@ -37,7 +37,7 @@ SIGNIFICANCE = 0.01
 LEAST = 3
 
 #: Drift over the log that matters, as a share of the 95 % interval: the interval then covers 93 %.
-WORTH = 0.1
+LEAST_DRIFT = 0.1
 
 #: Name of a signal, and the stamps of its rows, s.
 Stamped: TypeAlias = tuple[str, Array]
@@ -84,39 +84,39 @@ def why_two_clocks(found: LoopLatency, command: Stamped, response: Stamped) -> s
     start, stop = response[1][[0, -1]].tolist()
     length = stop - start
     low, high = found.interval
-    worth = WORTH * (high - low)
+    allowed = LEAST_DRIFT * (high - low)
     names = f"{command[0]} and {response[0]}"
-    stamps = rates_apart(command[1], response[1])
-    apart = 0.0 if stamps is None or abs(stamps.value) <= stamps.most else stamps.value
+    stamps = rate_of_drift(command[1], response[1])
+    drift = 0.0 if stamps is None or abs(stamps.value) <= stamps.most else stamps.value
     grows = growth_of(found.times, found.time, start)
-    if grows is not None and not grows.may_be(0.0) and abs(grows.value) * length > worth:
+    if grows is not None and not grows.may_be(0.0) and abs(grows.value) * length > allowed:
         by = stated(grows.value, grows.error, "s")
         error = math.hypot(grows.start_error, (high - low) / TWO_SIDED)
         first = stated(found.time + grows.start, error, "s")
-        also = f", whose time stamps drift apart by {1e6 * abs(apart):.3g} ppm" if apart else ""
+        also = f", whose time stamps drift apart by {1e6 * abs(drift):.3g} ppm" if drift else ""
         return (
             f"the time from command to response grows by {by} each second, from {first} at the "
             f"start of the log. Either the clocks of {names} drift apart{also}, or the vehicle "
             "changes"
         )
-    if abs(apart) * length <= worth or not (grows is None or grows.may_be(apart)):
+    if abs(drift) * length <= allowed or not (grows is None or grows.may_be(drift)):
         return ""
     return (
-        f"the time stamps of {names} drift apart by {1e6 * abs(apart):.3g} ppm. If they come "
-        f"from two clocks, the time is wrong by {stated(abs(apart), 0.0, 's')} for each second "
+        f"the time stamps of {names} drift apart by {1e6 * abs(drift):.3g} ppm. If they come "
+        f"from two clocks, the time is wrong by {stated(abs(drift), 0.0, 's')} for each second "
         "since the two clocks agreed"
     )
 
 
-def rates_apart(sent: Array, received: Array) -> Rate | None:
+def rate_of_drift(sent: Array, received: Array) -> Rate | None:
     """By how much faster the stamps of a response advance; None where rows are not regular."""
     ours, theirs = _period(sent), _period(received)
     if ours is None or theirs is None:
         return None
     ratio = theirs.value / ours.value
-    whole = min(_whole_ratios(), key=lambda one: abs(ratio / one - 1.0))
-    apart = ratio / whole - 1.0
-    return Rate(apart, ours.most + theirs.most) if abs(apart) < QUARTZ else None
+    whole = min(_whole_ratios(), key=lambda candidate: abs(ratio / candidate - 1.0))
+    drift = ratio / whole - 1.0
+    return Rate(drift, ours.most + theirs.most) if abs(drift) < QUARTZ else None
 
 
 def _whole_ratios() -> set[float]:
@@ -157,7 +157,7 @@ def growth_of(each: Sequence[WindowTime], time: float, start: float) -> Growth |
 
     if len(each) < LEAST:
         return None
-    at, times, errors = np.array([(one.at, one.time - time, one.stderr) for one in each]).T
+    at, times, errors = np.array([(part.at, part.time - time, part.stderr) for part in each]).T
     errors = np.maximum(errors, np.median(errors))
     rows = np.stack([np.ones(at.size), at - start], axis=1) / errors[:, None]
     (first, slope), *_ = np.linalg.lstsq(rows, times / errors)

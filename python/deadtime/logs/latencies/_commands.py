@@ -53,34 +53,34 @@ class Sampling(NamedTuple):
 
 def period_of(log: Log, kind: Kind) -> Period | None:
     """The period of the controller of a loop, if it is known."""
-    told = log.parameters
+    parameters = log.parameters
     if log.autopilot == "PX4" and kind in ("velocity", "position"):
         return Period(1.0 / PX4_OUTER, f"at least {PX4_OUTER:g} Hz", True)
     if log.autopilot == "Crazyflie":
         return Period(1.0 / CRAZYFLIE[kind], f"{CRAZYFLIE[kind]:g} Hz, the rate of the firmware")
     for name in ("SCHED_LOOP_RATE", "IMU_GYRO_RATEMAX"):
-        if told.get(name, 0.0) > 0.0:
-            return Period(1.0 / told[name], f"{name} {told[name]:g}")
-    steps = max(told.get("pid_process_denom", 1.0), 1.0)
-    if log.autopilot in ("Betaflight", "INAV") and told.get("looptime", 0.0) > 0.0:
-        time = told["looptime"] * steps
-        return Period(1e-6 * time, f"looptime of {told['looptime']:g} µs, times {steps:g}")
+        if parameters.get(name, 0.0) > 0.0:
+            return Period(1.0 / parameters[name], f"{name} {parameters[name]:g}")
+    steps = max(parameters.get("pid_process_denom", 1.0), 1.0)
+    if log.autopilot in ("Betaflight", "INAV") and parameters.get("looptime", 0.0) > 0.0:
+        time = parameters["looptime"] * steps
+        return Period(1e-6 * time, f"looptime of {parameters['looptime']:g} µs, times {steps:g}")
     return None
 
 
-def sampling_of(log: Log, kind: Kind, told: Series) -> Sampling:
+def sampling_of(log: Log, kind: Kind, command: Series) -> Sampling:
     """How the commands of a loop pass between its rows.
 
     A setpoint that a ground station sends is logged each time. Where the period of the controller
     is known only to be less than a bound, half of that is taken.
     """
-    if told.source.startswith("SET_"):
+    if command.source.startswith("SET_"):
         return Sampling("held")
     period = period_of(log, kind)
     if period is None or period.at_most:
-        most = min(told.period, 1.0 / LEAST if period is None else period.time)
+        most = min(command.period, 1.0 / LEAST if period is None else period.time)
         return Sampling("straight", 0.5 * most, 0.25 * most)
-    if told.period < EACH * period.time:
+    if command.period < EACH * period.time:
         return Sampling("held")
     return Sampling("straight", period.time)
 

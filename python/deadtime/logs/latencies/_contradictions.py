@@ -18,7 +18,7 @@ ALIKE, APART = ("north", "east"), 2.0
 
 def doubted_by_others(loops: list[LoopLatency]) -> list[LoopLatency]:
     """The times as indications, where others contradict them."""
-    reliable = [one for one in loops if one.verdict == "reliable"]
+    reliable = [fit for fit in loops if fit.verdict == "reliable"]
     found = []
     for loop in loops:
         judged = loop
@@ -29,16 +29,16 @@ def doubted_by_others(loops: list[LoopLatency]) -> list[LoopLatency]:
     return found
 
 
-def _by_axes(one: LoopLatency, reliable: list[LoopLatency]) -> Iterator[str]:
+def _by_axes(loop: LoopLatency, reliable: list[LoopLatency]) -> Iterator[str]:
     """Why the same loop of another axis contradicts this one."""
     for other in reliable:
-        alike = (one.kind, one.command) == (other.kind, other.command)
-        if not (alike and one.axis != other.axis and {one.axis, other.axis} <= set(ALIKE)):
+        alike = (loop.kind, loop.command) == (other.kind, other.command)
+        if not (alike and loop.axis != other.axis and {loop.axis, other.axis} <= set(ALIKE)):
             continue
-        (low, high), (least, most) = one.interval, other.interval
+        (low, high), (least, most) = loop.interval, other.interval
         if max(low, least) > APART * min(high, most):
             yield (
-                f"{one.axis} and {other.axis} contradict each other, because their times are "
-                f"{stated(one.time, one.stderr, 's')} and "
+                f"{loop.axis} and {other.axis} contradict each other, because their times are "
+                f"{stated(loop.time, loop.stderr, 's')} and "
                 f"{stated(other.time, other.stderr, 's')}"
             )

@@ -42,7 +42,7 @@ class Piece(NamedTuple):
 
     start: float
     asked: Array
-    came: Array
+    response: Array
 
 
 class Grid(NamedTuple):
@@ -74,13 +74,13 @@ def grid_of(
     for low, high in segments:
         time = np.arange(low, high, step)
         asked = value_at(setpoint, time, held)
-        came = value_at(response, time, False)
-        if time.size > 1 and np.isfinite(asked).all() and np.isfinite(came).all():
-            pieces.append(Piece(low, asked, came))
+        measured = value_at(response, time, False)
+        if time.size > 1 and np.isfinite(asked).all() and np.isfinite(measured).all():
+            pieces.append(Piece(low, asked, measured))
     if not pieces:
         return Grid(step, [])
     means = [float(np.mean(np.concatenate([piece[k] for piece in pieces]))) for k in (1, 2)]
-    return Grid(step, [Piece(p.start, p.asked - means[0], p.came - means[1]) for p in pieces])
+    return Grid(step, [Piece(p.start, p.asked - means[0], p.response - means[1]) for p in pieces])
 
 
 def value_at(series: Series, time: Array, held: bool) -> Array:
@@ -133,10 +133,10 @@ def _sums(piece: Piece, lags: NDArray[np.int64], start: int, stop: int) -> Array
     inside = piece.asked[max(0, first) : last]
     asked = np.pad(inside, ends)
     known = np.pad(np.ones(inside.size), ends)
-    came = piece.came[start:stop]
-    ones = np.ones_like(came)
+    output = piece.response[start:stop]
+    ones = np.ones_like(output)
     values = np.stack([known, asked, asked**2, known, known, asked])
-    return correlated(values, np.stack([ones, ones, ones, came, came**2, came]))[:, ::-1]
+    return correlated(values, np.stack([ones, ones, ones, output, output**2, output]))[:, ::-1]
 
 
 def _coefficient(sums: Array) -> Array:
@@ -168,7 +168,7 @@ def independent_rows(grid: Grid, longest: float) -> float:
     shared = np.zeros(1)
     for piece in grid.pieces:
         reach = min(round(longest / grid.step), piece.asked.size - 1)
-        parts = [_autocovariance(values, reach) for values in (piece.asked, piece.came)]
+        parts = [_autocovariance(values, reach) for values in (piece.asked, piece.response)]
         both = parts[0] * parts[1] / piece.asked.size
         shared = np.pad(shared, (0, max(0, both.size - shared.size)))
         shared[: both.size] += both

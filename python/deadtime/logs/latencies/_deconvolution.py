@@ -95,11 +95,11 @@ def _spectra(grid: Grid, longest: float) -> tuple[Spectrum, Array]:
     for piece in grid.pieces:
         if piece.asked.size < rows:
             continue
-        asked, came = (
+        asked, response = (
             np.fft.rfft(sliding_window_view(part, rows)[:: rows // 2] * weight, size)
-            for part in (piece.asked, piece.came)
+            for part in (piece.asked, piece.response)
         )
-        crosses.append(np.conj(asked) * came)
+        crosses.append(np.conj(asked) * response)
         powers.append(np.abs(asked) ** 2)
     if not crosses:
         return np.empty((0, 0), complex), np.empty((0, 0))

@@ -93,10 +93,10 @@ class Latency(ReadOnlyArrays, Pictured):
         ValueError
             When there is no such loop; the message lists those there are.
         """
-        for one in self.loops:
-            if one.loop == name and one.command == command:
-                return one
-        has = ", ".join(f"{one.loop!r} from {one.command}" for one in self.loops) or "none"
+        for loop in self.loops:
+            if loop.loop == name and loop.command == command:
+                return loop
+        has = ", ".join(f"{loop.loop!r} from {loop.command}" for loop in self.loops) or "none"
         raise ValueError(
             f"{name!r} has no time from its {command} to its response. There are times for {has}"
         )
@@ -104,7 +104,7 @@ class Latency(ReadOnlyArrays, Pictured):
     @property
     def estimated(self) -> tuple[LoopLatency, ...]:
         """The loops that have a time."""
-        return tuple(one for one in self.loops if one.verdict != "none")
+        return tuple(loop for loop in self.loops if loop.verdict != "none")
 
     def headline(self) -> str:
         """The shortest answer: the fastest loop of the vehicle that has a time, in one line."""
@@ -115,7 +115,7 @@ class Latency(ReadOnlyArrays, Pictured):
 
     def summary(self) -> str:
         """All loops in one table, a line each, and what is most worth knowing."""
-        table = LatencyTable([(one.loop, one.command) for one in self.loops])
+        table = LatencyTable([(loop.loop, loop.command) for loop in self.loops])
         lines = [self.heading(), "", table.head(), *table.rows(self.loops), "", *self.below()]
         return "\n".join(lines).rstrip()
 
@@ -130,14 +130,14 @@ class Latency(ReadOnlyArrays, Pictured):
     def details(self) -> str:
         """Every loop with its plant, its windows, its stages and what they cost."""
         lines = [self.heading()]
-        for one in self.estimated:
-            lines += ["", *in_full(one, self.stages.get(one.loop, ()))]
+        for loop in self.estimated:
+            lines += ["", *in_full(loop, self.stages.get(loop.loop, ()))]
         if refused := refused_of(self.loops):
             lines += ["", *(f"none: {names}: {reason}" for names, reason in refused)]
         if self.link is not None:
             lines += ["", self.link.summary()]
-        ends = [*(one.line() for one in self.filters), *self.remarks]
-        ends += [f"to know more: {one.line()}" for one in self.advice]
+        ends = [*(part.line() for part in self.filters), *self.remarks]
+        ends += [f"to know more: {suggestion.line()}" for suggestion in self.advice]
         return "\n".join([*lines, "", *ends]).rstrip()
 
     def to_dict(self) -> dict[str, Any]:
@@ -146,14 +146,14 @@ class Latency(ReadOnlyArrays, Pictured):
             {
                 "source": self.source,
                 "vehicle": self.vehicle,
-                "loops": [one.to_dict() for one in self.loops],
+                "loops": [loop.to_dict() for loop in self.loops],
                 "stages": {
-                    name: [one.to_dict() for one in some] for name, some in self.stages.items()
+                    name: [stage.to_dict() for stage in some] for name, some in self.stages.items()
                 },
-                "filters": [one._asdict() for one in self.filters],
+                "filters": [part._asdict() for part in self.filters],
                 "remarks": self.remarks,
                 "link": None if self.link is None else self.link.to_dict(),
-                "advice": [one._asdict() for one in self.advice],
+                "advice": [suggestion._asdict() for suggestion in self.advice],
             }
         )
 
@@ -175,7 +175,7 @@ class Latency(ReadOnlyArrays, Pictured):
         from deadtime.logs.latencies._page import budget_of, fit_of, sentence
 
         found = self.estimated
-        rows = [cells_of(one) for one in found]
+        rows = [cells_of(loop) for loop in found]
         used = [k for k in range(len(HEADS)) if any(row[k] for row in rows)]
         text = page(
             "logs/latencies/page.html",
@@ -188,11 +188,11 @@ class Latency(ReadOnlyArrays, Pictured):
             all=self._picture(),
             budget=budget_of(self.stages),
             filters=[
-                (one.name, one.path, stated(one.delay, 0.0, "s"), one.source)
-                for one in self.filters
+                (part.name, part.path, stated(part.delay, 0.0, "s"), part.source)
+                for part in self.filters
             ],
             link="" if self.link is None else sentence(self.link.summary()),
-            fits=[fit_of(one, *_moves_of(one)) for one in found],
+            fits=[fit_of(loop, *_moves_of(loop)) for loop in found],
             refused=refused_of(self.loops),
             remarks=self.remarks,
             around=around_the_vehicle(found),
@@ -203,16 +203,16 @@ class Latency(ReadOnlyArrays, Pictured):
         return f"<Latency of {self.source}: {len(self.estimated)} of {len(self.loops)} loops>"
 
 
-def _moves_of(one: LoopLatency) -> tuple[Moves | None, Moves | None]:
-    return (None if one.plain is None else one.plain.aligned), one.answered
+def _moves_of(loop: LoopLatency) -> tuple[Moves | None, Moves | None]:
+    return (None if loop.plain is None else loop.plain.aligned), loop.answered
 
 
-def _order(one: LoopLatency) -> tuple[bool, bool, int, bool, float]:
+def _order(loop: LoopLatency) -> tuple[bool, bool, int, bool, float]:
     """Reliable times first, well known ones, inner loops before outer ones, the vehicle alone."""
     kinds = ("rate", "attitude", "velocity", "position", "")
-    kind = kinds.index(one.kind) if one.kind in kinds else len(kinds)
-    wide = not one.stderr < WIDE * one.time
-    return (one.verdict != "reliable", wide, kind, one.command == "setpoint", one.stderr)
+    kind = kinds.index(loop.kind) if loop.kind in kinds else len(kinds)
+    wide = not loop.stderr < WIDE * loop.time
+    return (loop.verdict != "reliable", wide, kind, loop.command == "setpoint", loop.stderr)
 
 
 def latency(
@@ -271,11 +271,11 @@ def latency(
     >>> import numpy as np
     >>> import deadtime as dtm
     >>> time = np.arange(600) * 0.01
-    >>> told = np.where(time < 0.3, 0.0, 0.2 * np.sign(np.sin(3.7 * (time - 0.3))))
+    >>> command = np.where(time < 0.3, 0.0, 0.2 * np.sign(np.sin(3.7 * (time - 0.3))))
     >>> vehicle = dtm.FactoredPlant([0.08]).transfer_function() * dtm.delay(0.03)
-    >>> angle = np.ravel(vehicle.simulate(time, told).outputs)
+    >>> angle = np.ravel(vehicle.simulate(time, command).outputs)
     >>> angle = angle + 0.003 * np.random.default_rng(1).standard_normal(600)
-    >>> found = dtm.latency(dtm.Recording(time, told, angle)).loops[0]
+    >>> found = dtm.latency(dtm.Recording(time, command, angle)).loops[0]
     >>> w = found.frequencies
     >>> true = float((0.03 + np.arctan(0.08 * w) / w) @ found.weights)
     >>> low, high = found.interval
@@ -290,12 +290,12 @@ def latency(
     if not isinstance(log, Log):
         log = open_log(log)
     chosen = _chosen(log, axes, loops)
-    wanted = [(loop, one) for loop in chosen for one in _commands(loop)]
-    report = _reported(progress, [(loop.name, one) for loop, one in wanted])
+    wanted = [(loop, command) for loop in chosen for command in _commands(loop)]
+    report = _reported(progress, [(loop.name, command) for loop, command in wanted])
     times = []
-    for one in _each_of(log, wanted):
-        times.append(one)
-        report(one)
+    for result in _each_of(log, wanted):
+        times.append(result)
+        report(result)
     filters = filters_of(log)
     stages = {loop.name: stages_of(log, loop.name, times, filters) for loop in chosen}
     return Latency(
@@ -327,7 +327,7 @@ def _sent_from_the_ground(log: Log, loops: list[LogLoop]) -> list[str]:
     """A remark on setpoints that the ground station stamped when it sent them."""
     if log.link is None:
         return []
-    names = [one.name for one in loops if one.setpoint.source.startswith("SET_")]
+    names = [loop.name for loop in loops if loop.setpoint.source.startswith("SET_")]
     if not names:
         return []
     half = log.link.half_round_trip
@@ -350,10 +350,10 @@ def _chosen(log: Log, axes: Iterable[str] | None, names: Iterable[str] | None) -
             continue
         asked = [wanted] if isinstance(wanted, str) else list(wanted)
         has = list(dict.fromkeys(getattr(loop, what) for loop in log.loops.values()))
-        for one in asked:
-            if one not in has:
+        for name in asked:
+            if name not in has:
                 raise ValueError(
-                    f"{log.source} has no loop with the {what} {one!r}. It has "
+                    f"{log.source} has no loop with the {what} {name!r}. It has "
                     f"{', '.join(has) or 'none'}"
                 )
         found = [loop for loop in found if getattr(loop, what) in asked]
@@ -370,7 +370,7 @@ def loops_asked_for(
                 f"{log.source or 'the recording'} has only one loop: leave axis and loop out"
             )
         return [(_name_of(log), "setpoint" if log.command is None else "actuator")]
-    return [(loop.name, one) for loop in _chosen(log, axes, loops) for one in _commands(loop)]
+    return [(loop.name, signal) for loop in _chosen(log, axes, loops) for signal in _commands(loop)]
 
 
 def _reported(
@@ -385,12 +385,12 @@ def _reported(
             )
         return progress
     if not progress:
-        return lambda one: None
+        return lambda _: None
     table = LatencyTable(wanted)
     print(table.head(), file=sys.stderr, flush=True)
 
-    def show(one: LoopLatency) -> None:
-        if (row := table.row(one)) is not None:
+    def show(result: LoopLatency) -> None:
+        if (row := table.row(result)) is not None:
             print(row, file=sys.stderr, flush=True)
 
     return show
@@ -411,11 +411,11 @@ def _each_of(log: Log, wanted: list[tuple[LogLoop, Command]]) -> Iterator[LoopLa
         begun += [pool.submit(latency_of, log, *asked) for asked in wanted[1:]]
         alike = [place for place, (loop, _) in enumerate(wanted) if loop.axis in ALIKE]
         judged: dict[int, LoopLatency] = {}
-        for place, one in enumerate(begun):
+        for place, task in enumerate(begun):
             if place in alike and not judged:
                 both = doubted_by_others([begun[k].result() for k in alike])
                 judged = dict(zip(alike, both, strict=True))
-            yield judged[place] if place in judged else one.result()
+            yield judged[place] if place in judged else task.result()
         done = True
     finally:
         # After Ctrl-C nobody waits for what the kernel still computes.
@@ -433,8 +433,8 @@ def latency_of(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
     if not loop.segments:
         why = "; ".join(loop.why_left_out) or "the response never follows its setpoint"
         return LoopLatency(loop.name, loop.axis, loop.kind, command, "none", why)
-    told = loop.signals[command]
-    sampling = sampling_of(log, loop.kind, told)
+    signal = loop.signals[command]
+    sampling = sampling_of(log, loop.kind, signal)
     together = together_of(loop.response, loop.kind)
 
     def part(start: float, stop: float) -> Recording:
@@ -451,9 +451,9 @@ def latency_of(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
     if command == "setpoint":
         found = beside_plain_numbers(found, loop, sampling)
     # Two signals of one message have one clock.
-    if found.verdict == "none" or told.topic == loop.response.topic:
+    if found.verdict == "none" or signal.topic == loop.response.topic:
         return found
-    named = ((one.source, one.time) for one in (told, loop.response))
+    named = ((series.source, series.time) for series in (signal, loop.response))
     why = why_two_clocks(found, *named)
     return found.doubted(why) if why else found
 
@@ -461,27 +461,27 @@ def latency_of(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
 def _of_recording(recording: Recording) -> Latency:
     """A single recording: from its command, or from its reference where it has none."""
     ((name, command),) = loops_asked_for(recording)
-    told = recording
+    driven = recording
     if command == "setpoint":
-        told = Recording(
+        driven = Recording(
             recording.time, recording.reference, recording.output,
             command=recording.reference, units=recording.units, source=recording.source,
         )  # fmt: skip
-    whole, parts = parts_of(told)
-    one = relation_of(LoopLatency(name, "", "", command, "none", ""), parts, whole.window)
+    whole, parts = parts_of(driven)
+    result = relation_of(LoopLatency(name, "", "", command, "none", ""), parts, whole.window)
     further: tuple[Advice, ...] = ()
     count = len(moving_of(parts))
-    if one.verdict == "none" and count < min(FEW, len(parts)):
+    if result.verdict == "none" and count < min(FEW, len(parts)):
         why = (
             f"the {command} moves in {count} of {len(parts)} parts of the recording, but a time "
             f"needs {FEW}"
         )
-        one, further = replace(one, reason=why), (OF_A_PROCESS,)
-    if recording.sent is not None and one.verdict != "none":
+        result, further = replace(result, reason=why), (OF_A_PROCESS,)
+    if recording.sent is not None and result.verdict != "none":
         clocks = (("the commands", recording.sent.time), ("the rows", recording.time))
-        if why := why_two_clocks(one, *clocks):
-            one = one.doubted(why)
-    return Latency(name, _vehicle_of(recording), (one,), advice=further)
+        if why := why_two_clocks(result, *clocks):
+            result = result.doubted(why)
+    return Latency(name, _vehicle_of(recording), (result,), advice=further)
 
 
 def _name_of(recording: Recording) -> str:

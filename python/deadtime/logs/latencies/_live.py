@@ -33,36 +33,36 @@ def around_the_vehicle(estimated: Sequence[LoopLatency]) -> Around | None:
     known, and then the one of the least error.
     """
     reliable = [
-        one
-        for one in estimated
-        if one.cost
-        and one.verdict == "reliable"
-        and one.estimate
-        and one.estimate.verdict != "none"
+        fit
+        for fit in estimated
+        if fit.cost
+        and fit.verdict == "reliable"
+        and fit.estimate
+        and fit.estimate.verdict != "none"
     ]
     if not reliable:
         return None
-    one = min(reliable, key=lambda one: (_flown(one) is None, one.stderr))
-    assert one.estimate is not None
-    assert one.cost is not None
-    gain = _flown(one)
+    fit = min(reliable, key=lambda fit: (_flown(fit) is None, fit.stderr))
+    assert fit.estimate is not None
+    assert fit.cost is not None
+    gain = _flown(fit)
     which = "the gain that the vehicle uses" if gain is not None else "the well damped gain"
     words = (
-        f"Loop: the vehicle as estimated ({one.name}), with a proportional controller of the "
-        f"{one.loop} that has {which}. The largest stable gain is for this loop, without other "
+        f"Loop: the vehicle as estimated ({fit.name}), with a proportional controller of the "
+        f"{fit.loop} that has {which}. The largest stable gain is for this loop, without other "
         "terms of the controller. The interval is for the delay, with gain and lag as "
         "estimated."
     )
-    controller = P(one.cost.well_damped if gain is None else gain)
-    widest, longest = (float(f"{_BEYOND * end:.2g}") for end in (one.cost.largest, one.time))
+    controller = P(fit.cost.well_damped if gain is None else gain)
+    widest, longest = (float(f"{_BEYOND * end:.2g}") for end in (fit.cost.largest, fit.time))
     ranges = {"Kp": (min(widest, 0.0), max(widest, 0.0)), "delay": (0.0, longest)}
-    loop = one.estimate.loop(controller)
-    return Around(explorer_of(loop.specification, ranges, one.estimate.ci()), words)
+    loop = fit.estimate.loop(controller)
+    return Around(explorer_of(loop.specification, ranges, fit.estimate.ci()), words)
 
 
-def _flown(one: LoopLatency) -> float | None:
+def _flown(fit: LoopLatency) -> float | None:
     """The proportional gain of the log, if it is one with which the model is stable."""
-    cost = one.cost
+    cost = fit.cost
     if cost is None or cost.flown is None or cost.delay_margin is None:
         return None
     return None if math.isnan(cost.delay_margin) else cost.flown

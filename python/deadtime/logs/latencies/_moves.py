@@ -94,8 +94,8 @@ class Moves(ReadOnlyArrays):
     >>> from deadtime.logs import moves_of
     >>> time = np.arange(0.0, 60.0, 0.02)
     >>> asked = Series(time, np.floor(time / 2.0) % 2.0, "rad", "asked")
-    >>> came = Series(time, np.floor((time - 0.1) / 2.0) % 2.0, "rad", "came")
-    >>> found = moves_of(asked, came, [(0.0, 59.0)], longest=1.0)
+    >>> response = Series(time, np.floor((time - 0.1) / 2.0) % 2.0, "rad", "response")
+    >>> found = moves_of(asked, response, [(0.0, 59.0)], longest=1.0)
     >>> found.count, abs(found.median - 0.1) < 0.011
     (29, True)
     """

@@ -24,25 +24,25 @@ def budget_of(stages: Mapping[str, Sequence[Stage]]) -> list[tuple[str, ...]]:
 
 
 def fit_of(
-    one: LoopLatency, moves: Moves | None = None, fitted: Moves | None = None
+    loop: LoopLatency, moves: Moves | None = None, fitted: Moves | None = None
 ) -> dict[str, object]:
     """A fit with its number, its pictures and what it costs.
 
     `moves` are those of the setpoint of the loop, `fitted` the same with the response of the fit.
     """
-    start, stop = one.windows[0]
-    number = len(one.windows)
+    start, stop = loop.windows[0]
+    number = len(loop.windows)
     more = f", the best of {number} windows that were fitted together" if number > 1 else ""
-    _, command, time, ends, verdict, seen, *_ = cells_of(one)
+    _, command, time, ends, verdict, seen, *_ = cells_of(loop)
     held = f"95 %: {ends}" if ends else NOT_CLAIMED
     return {
-        "heading": _capital(one.name),
+        "heading": _capital(loop.name),
         "number": time,
         "beside": f"{verdict}; {held}; from the {command}, seen in {seen}",
-        "sentences": [sentence(words) for words in said_of(one)],
-        "plain": plain_rows(one),
+        "sentences": [sentence(words) for words in said_of(loop)],
+        "plain": plain_rows(loop),
         "moves": None if moves is None else moves_of_page(moves, fitted),
-        "figure": plot_fit(one),
+        "figure": plot_fit(loop),
         "caption": f"The window from {start:.1f} to {stop:.1f} s{more}.",
     }
 

@@ -127,7 +127,7 @@ class PlainTimes(ReadOnlyArrays):
 
     def to_dict(self) -> dict[str, Any]:
         """The numbers as plain values for JSON."""
-        return {one.name: one.to_dict() for one in self.all}
+        return {time.name: time.to_dict() for time in self.all}
 
 
 @dataclass(frozen=True)
@@ -193,9 +193,9 @@ def plain_times(
     >>> time = np.arange(0.0, 60.0, 0.02)
     >>> sticks = np.repeat(np.random.default_rng(1).standard_normal(60), 50)
     >>> asked = Series(time, sticks, "rad", "asked")
-    >>> came = Series(time + 0.12, sticks, "rad", "came")
-    >>> found = plain_times(asked, came, [(1.0, 59.0)], longest=1.0, between="straight")
-    >>> [round(one.value, 2) for one in found.all]
+    >>> response = Series(time + 0.12, sticks, "rad", "response")
+    >>> found = plain_times(asked, response, [(1.0, 59.0)], longest=1.0, between="straight")
+    >>> [round(plain.value, 2) for plain in found.all]
     [0.12, 0.12, 0.12]
     """
     grid = grid_of(setpoint, response, segments, between == "held")
@@ -225,17 +225,17 @@ def differences(measured: PlainTimes, modelled: PlainTimes) -> tuple[Difference,
         Of the methods that give both numbers. One of twenty disagrees although the fit is right.
     """
     found = []
-    for one, other in zip(measured.all, modelled.all, strict=True):
-        if math.isnan(one.value) or math.isnan(other.value) or one._parts.size != other._parts.size:
+    for row, other in zip(measured.all, modelled.all, strict=True):
+        if math.isnan(row.value) or math.isnan(other.value) or row._parts.size != other._parts.size:
             continue
-        parts = one._parts - other._parts
-        if one.name == "moves":
+        parts = row._parts - other._parts
+        if row.name == "moves":
             interval = median_of(parts[np.isfinite(parts)])[1]
         else:
-            interval = _interval(one.value - other.value, parts)
+            interval = _interval(row.value - other.value, parts)
         low, high = interval
         found.append(
-            Difference(one.name, one.value, other.value, interval, low > 0.0 or high < 0.0)
+            Difference(row.name, row.value, other.value, interval, low > 0.0 or high < 0.0)
         )
     return tuple(found)
 
@@ -260,7 +260,7 @@ def _by_correlation(grid: Grid, longest: float) -> PlainTime:
         )
     if math.isnan(value):
         return none("the correlation is largest at the longest time that is tried")
-    parts = np.array([peak_of(found.lags, one)[0] for one in found.without])
+    parts = np.array([peak_of(found.lags, correlation)[0] for correlation in found.without])
     return _with_interval(name, meaning, value, parts, height, blocks, longest)
 
 

@@ -26,25 +26,25 @@ DRAWN, EVERY = 40, 2
 ROOM = 0.3
 
 
-def plot_latency(source: str, told: Sequence[LoopLatency]) -> Figure:
+def plot_latency(source: str, loops: Sequence[LoopLatency]) -> Figure:
     """The time of each loop as a bar, with its 95 % interval."""
-    if not told:
+    if not loops:
         raise ValueError(f"{source}: no loop has a time, so there is nothing to draw")
-    figure, ax = new_figure(7.5, AROUND + ROW * len(told))
-    unit, factor = time_unit(float(np.median([one.time for one in told])))
-    for place, one in enumerate(told):
-        reliable = one.verdict == "reliable"
+    figure, ax = new_figure(7.5, AROUND + ROW * len(loops))
+    unit, factor = time_unit(float(np.median([loop.time for loop in loops])))
+    for place, loop in enumerate(loops):
+        reliable = loop.verdict == "reliable"
         alpha = 1.0 if reliable else 0.35
-        ax.barh(place, one.time / factor, color=COLOURS[0], alpha=alpha, height=0.6)
+        ax.barh(place, loop.time / factor, color=COLOURS[0], alpha=alpha, height=0.6)
         if reliable:
-            ends = [end / factor for end in one.interval]
+            ends = [end / factor for end in loop.interval]
             ax.plot(ends, [place, place], color="0.15", lw=1.4, marker="|")
-    ax.set_yticks(range(len(told)))
+    ax.set_yticks(range(len(loops)))
     doubts = {"reliable": "", "indication": " (indication)"}
-    ax.set_yticklabels([f"{one.loop}, {one.command}{doubts[one.verdict]}" for one in told])
+    ax.set_yticklabels([f"{loop.loop}, {loop.command}{doubts[loop.verdict]}" for loop in loops])
     ax.invert_yaxis()
     # One loop with a long tail does not hide the others.
-    widest = max(one.time for one in told) / factor
+    widest = max(loop.time for loop in loops) / factor
     ax.set_xlim(0.0, 1.6 * widest)
     ax.set_xlabel(f"from the command to the response [{unit}]")
     handles = [ax.barh(0, 0, color=COLOURS[0]), *ax.plot([], [], color="0.15", lw=1.4, marker="|")]
@@ -101,18 +101,18 @@ def plot_moves(
     return figure
 
 
-def plot_fit(one: LoopLatency) -> Figure:
+def plot_fit(loop: LoopLatency) -> Figure:
     """The response of a loop over its best window, and the fitted plant."""
-    fit = one.estimate
+    fit = loop.estimate
     assert fit is not None
     figure, ax = new_figure(7.5, 2.8)
     recording = fit.recording
     unit = recording.units.get("output", "")
     ax.plot(recording.time, recording.output, **DATA, label="response")
-    if one.command == "setpoint":
+    if loop.command == "setpoint":
         ax.step(recording.time, recording.reference, where="post", **REFERENCE, label="setpoint")
     ax.plot(recording.time, fit.fitted, color=COLOURS[1], lw=1.4, label="fit")
     ax.set_xlabel("time after the start of the log [s]")
-    ax.set_ylabel(f"{one.loop} [{unit}]" if unit else one.loop)
+    ax.set_ylabel(f"{loop.loop} [{unit}]" if unit else loop.loop)
     figure.legend(loc="outside upper center", ncols=3, frameon=False)
     return figure

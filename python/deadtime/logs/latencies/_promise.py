@@ -128,7 +128,7 @@ def promised(
     >>> noise = 1e-3 * np.random.default_rng(1).standard_normal(600)
     >>> found = promised(
     ...     Series(time, asked, "rad", "asked"),
-    ...     Series(time, np.roll(asked, 3) + noise, "rad", "came"),
+    ...     Series(time, np.roll(asked, 3) + noise, "rad", "response"),
     ...     [(0.0, 59.0)],
     ...     longest=1.0,
     ... )
@@ -169,7 +169,7 @@ def promises_of(log: Log) -> dict[str, Promise]:
     >>> lines += [f"ATT, {k * 100000}, {k % 20 // 10}, {(k - 3) % 20 // 10}" for k in range(300)]
     >>> _ = file.write_text("\n".join(lines))
     >>> log = dtm.open_log(file)
-    >>> {name: one.line() for name, one in dtm.logs.promises_of(log).items()}
+    >>> {name: promise.line() for name, promise in dtm.logs.promises_of(log).items()}
     {'roll': '± 5.4 ms with these rows'}
     """
     return {loop.name: _of_loop(log, loop) for loop in log.loops.values() if loop.segments}
@@ -195,20 +195,20 @@ def _noise(grid: Grid, row: float, longest: float) -> tuple[float, float]:
     if not (best.height > FOLLOWS and math.isfinite(best.time)):
         return math.inf, math.nan
     late, every = round(best.time / grid.step), max(1, round(row / grid.step))
-    asked, came, slopes = [], [], []
+    asked, responses, slopes = [], [], []
     for piece, behind_it in zip(grid.pieces, best.pieces, strict=True):
         moved = behind_it[: max(0, behind_it.size - late)]
         if moved.size < 2:
             continue
         asked.append(moved[::every])
-        came.append(piece.came[late:][::every])
+        responses.append(piece.response[late:][::every])
         slopes.append(np.gradient(moved, grid.step)[::every])
-    x, y, slope = (np.concatenate(parts) for parts in (asked, came, slopes))
+    x, y, slope = (np.concatenate(parts) for parts in (asked, responses, slopes))
     x, y, slope = x - x.mean(), y - y.mean(), slope - slope.mean()
     left = y - float(x @ y) / float(x @ x) * x
     square = max(float(left @ left), 1e-300)
     rho = float(np.clip(left[1:] @ left[:-1] / square, 0.0, DRIFTS))
-    x, y, slope = (one[1:] - rho * one[:-1] for one in (x, y, slope))
+    x, y, slope = (values[1:] - rho * values[:-1] for values in (x, y, slope))
     gain = float(x @ y) / float(x @ x)
     left = y - gain * x
     slope = slope - x * (float(x @ slope) / float(x @ x))
@@ -221,9 +221,9 @@ def _noise(grid: Grid, row: float, longest: float) -> tuple[float, float]:
 
 def _best(grid: Grid, asked: list[Array], longest: float) -> _Best:
     """The correlation of the response with a setpoint behind a lag."""
-    lags, found = _crossed(asked, [piece.came for piece in grid.pieces], grid.step, longest)
-    size = math.sqrt(sum(float(one @ one) for one in asked))
-    size *= math.sqrt(sum(float(piece.came @ piece.came) for piece in grid.pieces))
+    lags, found = _crossed(asked, [piece.response for piece in grid.pieces], grid.step, longest)
+    size = math.sqrt(sum(float(values @ values) for values in asked))
+    size *= math.sqrt(sum(float(piece.response @ piece.response) for piece in grid.pieces))
     if not size > 0.0:
         return _Best(-math.inf, math.nan, asked)
     time, height = peak_of(lags, found / size)
@@ -231,12 +231,12 @@ def _best(grid: Grid, asked: list[Array], longest: float) -> _Best:
 
 
 def _crossed(
-    asked: list[Array], came: list[Array], step: float, longest: float
+    asked: list[Array], responses: list[Array], step: float, longest: float
 ) -> tuple[Array, Array]:
-    """Sums of asked(t - lag) came(t) over all pieces, by lag from one step ahead, s."""
+    """Sums of asked(t - lag) response(t) over all pieces, by lag from one step ahead, s."""
     count = round(longest / step)
     total = np.zeros(count + 2)
-    for x, y in zip(asked, came, strict=True):
+    for x, y in zip(asked, responses, strict=True):
         total += correlated(np.pad(y, (1, count)), x)
     return np.asarray((np.arange(total.size) - 1) * step), total
 

@@ -210,7 +210,7 @@ class LoopLatency(ReadOnlyArrays):
             )
         }  # fmt: skip
         known = {"interval_95": self.interval if self.verdict == "reliable" else None}
-        each = {"times": [vars(one) for one in self.times]}
+        each = {"times": [vars(window) for window in self.times]}
         return plain_fields({name: getattr(self, name) for name in names} | known | each | parts)
 
 
@@ -253,7 +253,7 @@ def _fitted(
     parts: Sequence[Recording], kind: str, integrates: bool | None, sampling: Sampling | None
 ) -> PlantEstimate:
     """The likeliest plant over all parts together."""
-    length = float(min(one.time[-1] - one.time[0] for one in parts))
+    length = float(min(part.time[-1] - part.time[0] for part in parts))
     longest = LONGEST * min(LENGTHS.get(kind, length), length)
     known: dict[str, Any] = {}
     if sampling is not None:
@@ -387,7 +387,7 @@ def _places(windows: Sequence[Window]) -> list[tuple[float, float, float]]:
     moving = sorted(grouped(windows, ALONE), key=_movement, reverse=True)[:ALONE]
     found = []
     for some in sorted(moving, key=lambda some: some[0].start):
-        rows = sum(len(one.recording) for one in some)
+        rows = sum(len(window.recording) for window in some)
         count = max(1, min(-(-FEW // len(moving)), rows // (2 * FEWEST)))
         edges = np.linspace(some[0].start, some[-1].stop, count + 1).tolist()
         found += [(start, stop, _movement(some)) for start, stop in pairwise(edges)]
@@ -396,7 +396,7 @@ def _places(windows: Sequence[Window]) -> list[tuple[float, float, float]]:
 
 def _movement(windows: Sequence[Window]) -> float:
     """That of windows together."""
-    return math.sqrt(sum(one.movement**2 for one in windows) / len(windows))
+    return math.sqrt(sum(window.movement**2 for window in windows) / len(windows))
 
 
 def _says_something(value: float, error: float, part: Recording) -> bool:

@@ -53,8 +53,8 @@ def least_size(
     """Size from which a change of the setpoint counts as a move, in its unit."""
     wide = max(2, round(longest / setpoint.period))
     asked = [rows_of(setpoint, segment)[1] for segment in segments]
-    came = [rows_of(response, segment)[1] for segment in segments]
-    bends = np.concatenate([np.diff(values, 2) for values in came] or [np.empty(0)])
+    responses = [rows_of(response, segment)[1] for segment in segments]
+    bends = np.concatenate([np.diff(values, 2) for values in responses] or [np.empty(0)])
     noise = 1.4826 * float(np.median(np.abs(bends))) / math.sqrt(6.0) if bends.size else 0.0
     span = max(
         (float(np.max(_spans(values, wide))) for values in asked if values.size), default=0.0

@@ -143,7 +143,7 @@ def spread_of(
     """
     from scipy.special import chdtrc, stdtrit
 
-    time, error = (np.asarray(one, dtype=float) for one in (times, errors))
+    time, error = (np.asarray(values, dtype=float) for values in (times, errors))
     size = np.full(time.shape, np.nan) if sizes is None else np.asarray(sizes, dtype=float)
     if time.ndim != 1 or not time.shape == error.shape == size.shape:
         raise ValueError(

@@ -49,15 +49,15 @@ class LatencyTable:
         """The line of heads."""
         return self._line(HEADS)
 
-    def row(self, one: LoopLatency) -> str | None:
+    def row(self, loop: LoopLatency) -> str | None:
         """The line of a loop; None where it takes no row.
 
         That is one without a time, and one that is one too many, of a table that would be long.
         """
-        if not self._left or (one.verdict == "none" and not self._all):
+        if not self._left or (loop.verdict == "none" and not self._all):
             return None
         self._left -= 1
-        return self._line(cells_of(one))
+        return self._line(cells_of(loop))
 
     def rows(self, loops: Sequence[LoopLatency]) -> list[str]:
         """The lines of all loops."""
@@ -68,33 +68,33 @@ class LatencyTable:
         return BETWEEN.join(f"{cell:<{width}}" for cell, width in used).rstrip()
 
 
-def cells_of(one: LoopLatency) -> tuple[str, ...]:
+def cells_of(loop: LoopLatency) -> tuple[str, ...]:
     """What stands in the row of a loop, under `HEADS`."""
-    if one.verdict == "none":
-        return (one.loop, one.command, "—", "", "none", "", "", "")
-    reliable = one.verdict == "reliable"
-    time = shown(one.time, one.stderr, "s") if reliable else f"about {about(one.time, 's')}"
-    if one.is_bound:
-        time = one.bound()
-    ends = between(*one.interval, one.stderr, "s") if reliable else ""
-    return (one.loop, one.command, time, ends, one.verdict, seen_in(one), *_gains(one))
+    if loop.verdict == "none":
+        return (loop.loop, loop.command, "—", "", "none", "", "", "")
+    reliable = loop.verdict == "reliable"
+    time = shown(loop.time, loop.stderr, "s") if reliable else f"about {about(loop.time, 's')}"
+    if loop.is_bound:
+        time = loop.bound()
+    ends = between(*loop.interval, loop.stderr, "s") if reliable else ""
+    return (loop.loop, loop.command, time, ends, loop.verdict, seen_in(loop), *_gains(loop))
 
 
-def seen_in(one: LoopLatency) -> str:
+def seen_in(loop: LoopLatency) -> str:
     """From how many moves of the setpoint a time comes, or from how many windows."""
-    moves = 0 if one.plain is None else one.plain.aligned.count
-    count, what = (moves, "move") if moves else (len(one.times) or len(one.windows), "window")
+    moves = 0 if loop.plain is None else loop.plain.aligned.count
+    count, what = (moves, "move") if moves else (len(loop.times) or len(loop.windows), "window")
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
-def _gains(one: LoopLatency) -> tuple[str, str]:
+def _gains(loop: LoopLatency) -> tuple[str, str]:
     """The well damped gain, and the one that is flown."""
-    cost = one.cost
+    cost = loop.cost
     if cost is None:
         return "", ""
     low, high = cost.well_damped_ci
     flown = "" if cost.flown is None else f"{cost.flown:.3g}"
-    if one.verdict != "reliable":
+    if loop.verdict != "reliable":
         return f"about {about(cost.well_damped)}", flown
     return stated(cost.well_damped, 0.25 * (high - low)), flown
 

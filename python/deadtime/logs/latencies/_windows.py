@@ -91,9 +91,9 @@ class Window(NamedTuple):
 
 def windows_of(log: Log, loop: LogLoop, command: Command, sampling: Sampling) -> list[Window]:
     """All windows of a loop, in order, without the time after pauses of the log."""
-    told = loop.signals[command]
+    signal = loop.signals[command]
     settles = SETTLES * LENGTHS[loop.kind]
-    pauses = [(low, high + settles) for low, high in sorted([*told.gaps, *log.gaps])]
+    pauses = [(low, high + settles) for low, high in sorted([*signal.gaps, *log.gaps])]
     segments = shared(list(loop.segments), outside(pauses))
     together = together_of(loop.response, loop.kind)
     length = min(LENGTHS[loop.kind], ROWS * together * loop.response.period)
@@ -119,17 +119,17 @@ def that_follow(windows: Sequence[Window]) -> list[Window]:
 
     On the ground, in a crash or a flip it does not, and moves the most.
     """
-    moving = [one for one in windows if one.movement > 0.0]
+    moving = [window for window in windows if window.movement > 0.0]
     if len(moving) < OTHERS:
         return list(windows)
-    follows = float(np.median([one.follows for one in moving]))
-    late = float(np.median([one.late for one in moving]))
+    follows = float(np.median([window.follows for window in moving]))
+    late = float(np.median([window.late for window in moving]))
     kept = []
-    for one in windows:
-        slack = ROWS_OFF * one.recording.sample_time
-        near = late / FACTOR - slack <= one.late <= FACTOR * late + slack
-        if near and one.follows >= FOLLOWS * follows:
-            kept.append(one)
+    for window in windows:
+        slack = ROWS_OFF * window.recording.sample_time
+        near = late / FACTOR - slack <= window.late <= FACTOR * late + slack
+        if near and window.follows >= FOLLOWS * follows:
+            kept.append(window)
     return kept
 
 
@@ -139,23 +139,23 @@ def _follows(part: Recording, longest: float) -> tuple[float, float]:
     step = part.sample_time
     even = np.arange(part.time[0], part.time[-1], step)
     line = np.polynomial.Polynomial.fit
-    told = np.interp(even, *part.sent)
-    came = np.interp(even, part.time, part.output)
-    told, came = told - line(even, told, 1)(even), came - line(even, came, 1)(even)
-    power = float(told @ told) * float(came @ came)
+    command = np.interp(even, *part.sent)
+    output = np.interp(even, part.time, part.output)
+    command, output = command - line(even, command, 1)(even), output - line(even, output, 1)(even)
+    power = float(command @ command) * float(output @ output)
     most = min(int(longest / step) + 1, even.size // 2)
     if power <= 0.0 or most < 1:
         return 0.0, 0.0
-    products = np.correlate(came, told[: even.size - most], "valid")
+    products = np.correlate(output, command[: even.size - most], "valid")
     best = int(np.argmax(products))
     return max(0.0, float(products[best])) ** 2 / power, best * step
 
 
 def movement_of(part: Recording) -> float:
     """Deviation of the command of a recording from a straight line."""
-    told = part.command if part.command is not None else part.reference
-    line = np.polynomial.Polynomial.fit(part.time, told, 1)
-    return float(np.std(told - line(part.time)))
+    command = part.command if part.command is not None else part.reference
+    line = np.polynomial.Polynomial.fit(part.time, command, 1)
+    return float(np.std(command - line(part.time)))
 
 
 def _divided(start: float, stop: float, length: float) -> Windows:
@@ -205,8 +205,8 @@ def best_of(windows: Sequence[Window]) -> Windows:
 
     Those that move the most, up to some number of rows.
     """
-    least = STILL * max((one.movement for one in windows), default=0.0)
-    left = [k for k, one in enumerate(windows) if one.movement > least]
+    least = STILL * max((window.movement for window in windows), default=0.0)
+    left = [k for k, window in enumerate(windows) if window.movement > least]
     chosen: Windows = []
     rows = MOST
     while left and len(chosen) < TOGETHER:
@@ -225,24 +225,24 @@ def best_of(windows: Sequence[Window]) -> Windows:
 
 def moving_of(windows: Sequence[Window]) -> list[Window]:
     """The windows in which the command moves."""
-    least = STILL * max((one.movement for one in windows), default=0.0)
-    return [one for one in windows if one.movement > least]
+    least = STILL * max((window.movement for window in windows), default=0.0)
+    return [window for window in windows if window.movement > least]
 
 
 def grouped(windows: Sequence[Window], most: int) -> list[list[Window]]:
     """About so many groups of neighbouring windows that move, in order, as far as rows allow."""
-    least = STILL * max((one.movement for one in windows), default=0.0)
-    moving = [k for k, one in enumerate(windows) if one.movement > least]
+    least = STILL * max((window.movement for window in windows), default=0.0)
+    moving = [k for k, window in enumerate(windows) if window.movement > least]
     size = -(-len(moving) // most)
     groups: list[list[Window]] = []
     last = -2
     for k in moving:
-        one = windows[k]
-        beside = k == last + 1 and bool(groups) and groups[-1][-1].segment == one.segment
-        if beside and len(groups[-1]) < size and _rows([*groups[-1], one]) <= GROUPED:
-            groups[-1].append(one)
+        window = windows[k]
+        beside = k == last + 1 and bool(groups) and groups[-1][-1].segment == window.segment
+        if beside and len(groups[-1]) < size and _rows([*groups[-1], window]) <= GROUPED:
+            groups[-1].append(window)
         else:
-            groups.append([one])
+            groups.append([window])
         last = k
     return groups
 
@@ -252,12 +252,12 @@ def whole_of(windows: Sequence[Window]) -> Windows:
 
     Those with the most movement, where there are many or they are long.
     """
-    least = STILL * max((one.movement for one in windows), default=0.0)
+    least = STILL * max((window.movement for window in windows), default=0.0)
     parts: dict[int, list[Window]] = {}
-    for one in windows:
-        if one.movement > least:
-            parts.setdefault(one.segment, []).append(one)
-    moving = sorted(parts.values(), key=lambda some: -sum(one.movement**2 for one in some))
+    for window in windows:
+        if window.movement > least:
+            parts.setdefault(window.segment, []).append(window)
+    moving = sorted(parts.values(), key=lambda some: -sum(window.movement**2 for window in some))
     chosen: Windows = []
     rows = 0
     for some in moving[:SEGMENTS]:
@@ -270,7 +270,7 @@ def whole_of(windows: Sequence[Window]) -> Windows:
 
 
 def _rows(windows: Sequence[Window]) -> int:
-    return sum(len(one.recording) for one in windows)
+    return sum(len(window.recording) for window in windows)
 
 
 def _runs(windows: Sequence[Window], places: Sequence[int], most: int) -> list[list[int]]:

@@ -49,7 +49,7 @@ def column_index(label: object, names: Sequence[str], signal: str, name: str) ->
         )
     similar = difflib.get_close_matches(name, names, n=1)
     hint = f"; did you mean {similar[0]!r}?" if similar else ""
-    shown = ", ".join(repr(one) for one in names[:12]) + (", …" if len(names) > 12 else "")
+    shown = ", ".join(repr(header) for header in names[:12]) + (", …" if len(names) > 12 else "")
     raise RecordingError(
         f"{label} has no column {name!r} for the {signal}. Its columns are {shown}{hint}"
     )
@@ -121,7 +121,7 @@ def numbers(label: str, values: Any) -> NDArray[np.float64]:
             array = array - array[~np.isnat(array)][:1]
         if array.dtype.kind == "m":
             array = array / np.timedelta64(1, "s")
-        if array.dtype.kind not in "biufO" or any(isinstance(one, str) for one in _some(array)):
+        if array.dtype.kind not in "biufO" or any(isinstance(value, str) for value in _some(array)):
             kind = "complex numbers" if array.dtype.kind == "c" else f"{array.dtype} values"
             raise TypeError(f"it contains {'text' if array.dtype.kind in 'OUST' else kind}")
         column = array.astype(np.float64)

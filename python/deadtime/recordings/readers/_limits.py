@@ -36,8 +36,8 @@ def errors_of(path: object, what: str) -> Iterator[None]:
     except DeadtimeError:
         raise
     except Exception as error:
-        told = " ".join(str(error).split())[:200] or "without a reason"
+        reason = " ".join(str(error).split())[:200] or "without a reason"
         raise RecordingError(
             f"{path} cannot be read as {what}, so it may be damaged or cut off: "
-            f"{type(error).__name__}: {told}"
+            f"{type(error).__name__}: {reason}"
         ) from error

@@ -150,14 +150,14 @@ def header_of(
     Numbers are names only where one of them is wanted.
     """
     headers, wrong = {}, None
-    for one in delimiter or DELIMITERS:
+    for sep in delimiter or DELIMITERS:
         try:
-            headers[one] = cells(line, one)
+            headers[sep] = cells(line, sep)
         except csv.Error as error:
             wrong = error
     if not headers:
         raise RecordingError(f"{path} is not a CSV file: {wrong}")
-    best = max(headers, key=lambda one: (len({*wanted} & {*headers[one]}), len(headers[one]) > 1))
+    best = max(headers, key=lambda sep: (len({*wanted} & {*headers[sep]}), len(headers[sep]) > 1))
     if {*wanted}.isdisjoint(headers[best]) and any(map(_are_values, headers.values())):
         raise RecordingError(
             f"the first line of {path} contains numbers, {line.strip()[:SHOWN]!r}. Add a line "

@@ -60,7 +60,7 @@ def _usual(signal: str, names: Sequence[str]) -> str | None:
     units = SECOND_IN if signal == "time" else UNITS
     plain = [(name, *_plain(name, units)) for name in names]
     if signal == "time":
-        plain = [one for one in plain if one[2] in SECOND_IN]
+        plain = [column for column in plain if column[2] in SECOND_IN]
     for usual in USUAL[signal]:
         # As it is written, before other capitals: t is a time beside a temperature T.
         exact = [name for name, _, _ in plain if name == usual]

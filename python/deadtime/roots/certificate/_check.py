@@ -157,7 +157,7 @@ class _Checker:
             fail("its bound for roots far away is not valid")
         if len(self.function.rows[index]) != degree + 1:
             fail("the row that should dominate far away does not have the highest degree")
-        room = abs(self.function.rows_exact[index][degree])
+        excess = abs(self.function.rows_exact[index][degree])
         lower = [Fraction(0)] * degree
         for j, row in enumerate(self.function.rows_exact):
             gap = self.function.delays_exact[j] - self.function.delays_exact[index]
@@ -175,12 +175,12 @@ class _Checker:
                 if k < degree:
                     lower[k] += weight * abs(c)
                 elif j != index:
-                    room -= weight * abs(c)
+                    excess -= weight * abs(c)
         r = Fraction(radius)
         affordable(self.function.rows, r)
         # With radius 0 the whole strip is excluded, which only a constant allows.
         positive = radius > 0 or degree == 0
-        if not positive or room * r**degree <= sum(c * r**k for k, c in enumerate(lower)):
+        if not positive or excess * r**degree <= sum(c * r**k for k, c in enumerate(lower)):
             fail(f"roots with |s| above {radius} are not excluded")
 
     def _is_right_edge(self, x: float, height: float) -> bool:

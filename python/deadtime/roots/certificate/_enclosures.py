@@ -137,11 +137,11 @@ def angle(x: int, y: int) -> int:
     Two halvings, t -> t / (1 + sqrt(1 + t^2)), then the series of the arctangent.
     """
     work = 96
-    one = 1 << work
+    unity = 1 << work
     large, small = max(abs(x), abs(y)), min(abs(x), abs(y))
     t = (small << work) // large
     for _ in range(2):
-        t = (t << work) // (one + isqrt(one * one + t * t))
+        t = (t << work) // (unity + isqrt(unity * unity + t * t))
     square = (t * t) >> work
     total, power, k = 0, t, 0
     while power:

@@ -222,9 +222,9 @@ class Enclosure:
     def is_within(self, center: tuple[Fraction, Fraction], radius: Fraction) -> bool:
         """Whether g is proved to be within `radius` of `center`."""
         unit = Fraction(1, 1 << self.bits)
-        room = radius - 2 * self.lost * unit
+        allowed = radius - 2 * self.lost * unit
         difference = (self.vr * unit - center[0], self.vi * unit - center[1])
-        return room >= 0 and difference[0] ** 2 + difference[1] ** 2 <= room**2
+        return allowed >= 0 and difference[0] ** 2 + difference[1] ** 2 <= allowed**2
 
     def slope_above(self) -> Fraction:
         """Upper bound on |g'|."""

@@ -156,10 +156,10 @@ class _Checker:
                 loop = {age: sign * ends[age][end] for age, end in zip(ages, chosen, strict=True)}
                 matrix = self._matrix([(age, loop[age]) for age in chain])
                 if not self._decreases(matrix, kept):
-                    told = ", ".join(
+                    gains = ", ".join(
                         f"{float(gain):.4g} at age {age}" for age, gain in loop.items()
                     )
-                    _fail(f"with the loop gains {told}, its form is not proved to decrease")
+                    _fail(f"with the loop gains {gains}, its form is not proved to decrease")
 
     def _matrix(self, commands: Sequence[tuple[int, Fraction]]) -> list[Row]:
         """The transition over a sample in which these ages with these gains are obeyed."""
@@ -177,7 +177,7 @@ class _Checker:
                     rows[i][j] += entry * self.signal[j]
         if self.smooth is not None:
             for i in range(2):
-                rows[n + i][:n] = [self.smooth.G[i] * one for one in plant.output]
+                rows[n + i][:n] = [self.smooth.G[i] * coefficient for coefficient in plant.output]
                 rows[n + i][n : n + 2] = self.smooth.F[i]
         if self.size > self.now:
             rows[self.now] = list(self.signal)
@@ -194,14 +194,14 @@ class _Checker:
         share = Enclosed(claims.Kv) / Enclosed(claims.Kp)
         row = list(plant.output)
         if self.smooth is not None:
-            row = [one + share * self.smooth.D * one for one in row]
-            row += [share * one for one in self.smooth.C]
+            row = [entry + share * self.smooth.D * entry for entry in row]
+            row += [share * entry for entry in self.smooth.C]
         elif claims.Kv != 0.0:
             if plant.slope is None:
                 _fail(
                     "the velocity y' is not a state of the plant, and the controller has no filter"
                 )
-            row = [one + share * slope for one, slope in zip(row, plant.slope, strict=True)]
+            row = [entry + share * slope for entry, slope in zip(row, plant.slope, strict=True)]
         return row + [Enclosed(0)] * (self.size - len(row))
 
     def _decreases(self, matrix: list[Row], kept: Fraction) -> bool:
@@ -209,24 +209,24 @@ class _Checker:
         size, form = self.size, self.whole
         # A in units of 2^-unit and P as whole numbers, so A'PA is in units of 4^-unit.
         unit = DIGITS + 1
-        middle = [[scaled(one.middle, unit) for one in row] for row in matrix]
-        radius = max(scaled(one.radius, unit) for row in matrix for one in row)
-        largest = max(abs(one) for row in middle for one in row)
-        heaviest = max(abs(one) for row in form for one in row)
+        middle = [[scaled(entry.middle, unit) for entry in row] for row in matrix]
+        radius = max(scaled(entry.radius, unit) for row in matrix for entry in row)
+        largest = max(abs(entry) for row in middle for entry in row)
+        heaviest = max(abs(entry) for row in form for entry in row)
         # Each entry of A'PA sums size^2 products; a row of the change sums `size` such entries.
         change = size**3 * heaviest * radius * (2 * largest + radius)
-        used = [[(j, one) for j, one in enumerate(row) if one] for row in middle]
+        used = [[(j, entry) for j, entry in enumerate(row) if entry] for row in middle]
         weighted = [[0] * size for _ in range(size)]  # P A
         for k, row in enumerate(used):
-            for j, one in row:
+            for j, entry in row:
                 for i in range(size):
-                    weighted[i][j] += form[i][k] * one
+                    weighted[i][j] += form[i][k] * entry
         share = scaled(kept, 2 * unit)
-        result = [[share * one for one in row] for row in form]
+        result = [[share * entry for entry in row] for row in form]
         for k, row in enumerate(used):
-            for i, one in row:
+            for i, entry in row:
                 for j in range(size):
-                    result[i][j] -= one * weighted[k][j]
+                    result[i][j] -= entry * weighted[k][j]
         for i in range(size):
             result[i][i] -= change
         return _is_positive(result)
@@ -238,8 +238,8 @@ class _Checker:
             most = Fraction(claims.least_factor) * Fraction(claims.Kp) / Fraction(claims.limit)
             bound = [
                 [
-                    one - most * most * (a * b).middle
-                    for one, b in zip(row, self.signal, strict=True)
+                    entry - most * most * (a * b).middle
+                    for entry, b in zip(row, self.signal, strict=True)
                 ]
                 for row, a in zip(self.form, self.signal, strict=True)
             ]
@@ -265,15 +265,15 @@ def _plant(claims: Claims) -> _Plant:
         _fail(f"the denominator is {den}, but the plant must be an integrator with at most one lag")
     if not 1 <= len(num) < len(den) or num[-1] == 0.0:
         _fail(f"the numerator is {num}, which is not possible")
-    one, zero, period = Enclosed(1), Enclosed(0), Enclosed(claims.sample_time)
+    unity, zero, period = Enclosed(1), Enclosed(0), Enclosed(claims.sample_time)
     if len(den) == 2:
         drive = Enclosed(num[0]) / Enclosed(den[0])
-        return _Plant([[one]], [[drive * period]], [one], None, [one])
+        return _Plant([[unity]], [[drive * period]], [unity], None, [unity])
     lead = Enclosed(den[0])
     a, b0 = Enclosed(den[1]) / lead, Enclosed(num[-1]) / lead
     b1 = Enclosed(num[0]) / lead if len(num) == 2 else zero
     faded = exponential_of(zero - a * period)
-    slow = (one - faded) / a
+    slow = (unity - faded) / a
     # The velocity of G at both ends, and G after a sample.
     ending = faded * b1 + slow * b0
     reached = b1 * slow + b0 * (period - slow) / a
@@ -282,11 +282,11 @@ def _plant(claims: Claims) -> _Plant:
     if first.low <= 0 or later.low <= 0:
         _fail("the tangents at the ends of the plant's response meet outside of the response")
     return _Plant(
-        transition=[[faded, slow], [zero, one]],
+        transition=[[faded, slow], [zero, unity]],
         shares=[[first * b1, first * b0], [later * ending, later * b0]],
-        output=[one, zero],
-        slope=[zero - a, one] if len(num) == 1 else None,
-        rest=[one, a],
+        output=[unity, zero],
+        slope=[zero - a, unity] if len(num) == 1 else None,
+        rest=[unity, a],
     )
 
 
@@ -318,7 +318,7 @@ class _Filter:
             for i in range(2)
         ]
         G = [inverse[i][1] * x for i in range(2)]
-        self.G = [Enclosed(one) for one in G]
+        self.G = [Enclosed(coefficient) for coefficient in G]
         self.C = [Enclosed(w * inverse[1][j]) for j in range(2)]
         self.D = Enclosed(weight * w * G[1])
 

@@ -111,10 +111,10 @@ class GainFollower:
                 return self._take(i, covered=True)
         return self._take(robust, covered=self._holds(robust, low, high, 0.0))
 
-    def _holds(self, number: int, low: float, high: float, room: float) -> bool:
+    def _holds(self, number: int, low: float, high: float, hysteresis: float) -> bool:
         """Whether the interval is in that of a set, with room above: no set is left downwards."""
         first, last = self.delays[number]
-        return first <= low and high <= last - room
+        return first <= low and high <= last - hysteresis
 
     def _take(self, number: int, covered: bool) -> Choice:
         if number > self.choice.number or not covered:

@@ -14,9 +14,9 @@ def plot_schedule(ax: Axes, schedule: GainSchedule) -> None:
     """Draw each gain over the delays for which its set is the fastest that is permitted."""
     for name in schedule.robust.gains:
         delays, gains = [schedule.delays[0]], []
-        for one in schedule.sets:
-            delays.append(one.delays[1])
-            gains.append(one.gains[name])
+        for gain_set in schedule.sets:
+            delays.append(gain_set.delays[1])
+            gains.append(gain_set.gains[name])
         ax.stairs(gains, delays, baseline=None, label=name, lw=2.0)
     ax.set(
         xlabel="longest delay / s",

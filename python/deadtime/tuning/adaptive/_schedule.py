@@ -120,7 +120,7 @@ class GainSchedule(ReadOnlyArrays, Pictured):
         GainFollower
         """
         return GainFollower(
-            tuple(one.delays for one in self.sets),
+            tuple(gain_set.delays for gain_set in self.sets),
             self.proof.sample_time,
             dwell=dwell,
             hysteresis=hysteresis,
@@ -138,9 +138,9 @@ class GainSchedule(ReadOnlyArrays, Pictured):
             f"{len(self.sets)} sets of gains. The schedule uses the fastest set that the delay "
             "allows:"
         ]
-        for one in self.sets:
-            gains = ", ".join(f"{name} = {value:.4g}" for name, value in one.gains.items())
-            low, high = one.delays
+        for gain_set in self.sets:
+            gains = ", ".join(f"{name} = {value:.4g}" for name, value in gain_set.gains.items())
+            low, high = gain_set.delays
             lines.append(f"  delay {low:.4g} to {high:.4g} s: {gains}")
         low, high = self.proof.gain
         over = f"{low:g}" if low == high else f"{low:g} to {high:g}"

@@ -143,19 +143,19 @@ def read(given: Mapping[str, float] | str, loop: str) -> Controller:
     """The controller of settings or of lines of the command line."""
     axis = loop.removesuffix(" rate")
     if isinstance(given, str):
-        told = dict(LINE.findall(given))
+        settings = dict(LINE.findall(given))
     else:
-        told = _of_head({name: str(value) for name, value in given.items()}, axis)
-    if f"p_{axis}" not in told:
-        raise ValueError(f"p_{axis} is missing. The text contains {', '.join(told) or 'none'}")
+        settings = _of_head({name: str(value) for name, value in given.items()}, axis)
+    if f"p_{axis}" not in settings:
+        raise ValueError(f"p_{axis} is missing. The text contains {', '.join(settings) or 'none'}")
     proportional, integral, derivative = (
-        _told(told, f"{letter}_{axis}") * scale
+        _setting(settings, f"{letter}_{axis}") * scale
         for letter, scale in zip("pid", scales(loop), strict=True)
     )
     if derivative:
-        _check_constant(told, axis)
-    smooth = _filter_of(told) if derivative else None
-    of_set_point = _told(told, f"f_{axis}") * FEEDFORWARD
+        _check_constant(settings, axis)
+    smooth = _filter_of(settings) if derivative else None
+    of_set_point = _setting(settings, f"f_{axis}") * FEEDFORWARD
     of_error = abs(derivative - of_set_point) <= SAME_F * max(FEEDFORWARD, scales(loop)[2])
     weights = {}
     if integral and derivative and of_set_point and not of_error:
@@ -164,7 +164,7 @@ def read(given: Mapping[str, float] | str, loop: str) -> Controller:
     return controller_from(proportional, integral, derivative, smooth, on_measurement, **weights)
 
 
-def _of_head(told: dict[str, str], axis: str) -> dict[str, str]:
+def _of_head(settings: dict[str, str], axis: str) -> dict[str, str]:
     """The values of a log's head under the names of the command line, where it is one."""
     place = ("roll", "pitch", "yaw").index(axis)
     renamed = {f"{axis}PID[{k}]": f"{letter}_{axis}" for k, letter in enumerate("pid")}
@@ -173,13 +173,13 @@ def _of_head(told: dict[str, str], axis: str) -> dict[str, str]:
         f"ff_weight[{place}]": f"f_{axis}",
         "dterm_lpf1_dyn_hz[0]": "dterm_lpf1_dyn_min_hz",
     }
-    return told | {name: told[head] for head, name in renamed.items() if head in told}
+    return settings | {name: settings[head] for head, name in renamed.items() if head in settings}
 
 
-def _check_constant(told: Mapping[str, str], axis: str) -> None:
+def _check_constant(settings: Mapping[str, str], axis: str) -> None:
     """Refuse a D that moves during the flight: d_min until 4.5, d_max since 4.6."""
-    own = _told(told, f"d_{axis}")
-    least, most = (_told(told, f"{peak}_{axis}") for peak in ("d_min", "d_max"))
+    own = _setting(settings, f"d_{axis}")
+    least, most = (_setting(settings, f"{peak}_{axis}") for peak in ("d_min", "d_max"))
     if 0.0 < least < own or most > own:
         ends = (least, own) if 0.0 < least < own else (own, most)
         raise ValueError(
@@ -218,8 +218,8 @@ def _low_pass(smooth: DerivativeFilter) -> tuple[str, float]:
     )
 
 
-def _filter_of(told: Mapping[str, str]) -> DerivativeFilter | None:
-    corners = [_told(told, f"dterm_lpf{k}_static_hz") for k in (1, 2)]
+def _filter_of(settings: Mapping[str, str]) -> DerivativeFilter | None:
+    corners = [_setting(settings, f"dterm_lpf{k}_static_hz") for k in (1, 2)]
     used = [k + 1 for k, corner in enumerate(corners) if corner > 0.0]
     if not used:
         return None
@@ -228,14 +228,14 @@ def _filter_of(told: Mapping[str, str]) -> DerivativeFilter | None:
             f"dterm_lpf1_static_hz = {corners[0]:g}, dterm_lpf2_static_hz = {corners[1]:g}: the "
             "controllers here have only one filter of D. Set one of the two to 0"
         )
-    if _told(told, "dterm_lpf1_dyn_min_hz") > 0.0:
+    if _setting(settings, "dterm_lpf1_dyn_min_hz") > 0.0:
         raise ValueError(
             "dterm_lpf1_dyn_min_hz is above 0, so the corner changes with the throttle. Set "
             "this parameter to 0"
         )
     name = f"dterm_lpf{used[0]}_type"
-    text = told.get(name, "PT1")
-    corner, kind = corners[used[0] - 1], TYPES[text] if text in TYPES else _told(told, name)
+    text = settings.get(name, "PT1")
+    corner, kind = corners[used[0] - 1], TYPES[text] if text in TYPES else _setting(settings, name)
     if kind == PT1:
         return one_pole_filter(corner)
     if kind == PT2:
@@ -245,9 +245,9 @@ def _filter_of(told: Mapping[str, str]) -> DerivativeFilter | None:
     raise ValueError(f"{name} = {text}: give one of PT1, PT2 and BIQUAD")
 
 
-def _told(told: Mapping[str, str], name: str) -> float:
+def _setting(settings: Mapping[str, str], name: str) -> float:
     """A number of zero or more; zero for one that is not there."""
-    text = told.get(name, "0")
+    text = settings.get(name, "0")
     try:
         value = float(text)
     except ValueError:

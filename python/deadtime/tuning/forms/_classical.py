@@ -251,7 +251,7 @@ def proportional_band(gain: float, spans: tuple[float, float]) -> float:
     >>> proportional_band(0.5, (200.0, 100.0))
     100.0
     """
-    measured, given = (finite("a span", one) for one in spans)
+    measured, given = (finite("a span", span) for span in spans)
     if min(measured, given) <= 0.0 or gain == 0.0:
         raise ValueError(
             f"gain={gain:g}, spans={spans}: give spans above zero, and a gain that is not zero"
@@ -348,8 +348,8 @@ def read(given: Mapping[str, float] | str, form: str, on_measurement: bool = Fal
 def _numbers(text: str, form: str) -> dict[str, float]:
     """Values by name of lines of text; other lines are skipped, and what is no number refused."""
     found = {}
-    for name, told in LINE.findall(text):
-        match = VALUE.fullmatch(told)
+    for name, entry in LINE.findall(text):
+        match = VALUE.fullmatch(entry)
         try:
             if match is None:
                 raise ValueError
@@ -358,12 +358,12 @@ def _numbers(text: str, form: str) -> dict[str, float]:
             found[name] = off if value == OFF else float(value)
         except ValueError:
             raise ValueError(
-                f"{name} = {told}: give one number in each line, with times in seconds, such "
+                f"{name} = {entry}: give one number in each line, with times in seconds, such "
                 f"as {name} = 40.5"
             ) from None
         if (unit == "%") != (name == "PB") and unit:
             raise ValueError(
-                f"{name} = {told}: give {name} in another unit, because {unit} is not possible"
+                f"{name} = {entry}: give {name} in another unit, because {unit} is not possible"
             )
     if not found:
         raise ValueError(f"no line of the text belongs to the form {form!r}: {text[:60]!r}")

@@ -178,15 +178,15 @@ def controller_of(values: Mapping[str, float], found: FirmwareLoop) -> Controlle
     if found.proportional not in values:
         names = ", ".join(values) or "none"
         raise ValueError(f"{found.proportional} is missing. The text contains {names}")
-    told = {part: values[name] for part, name in found.names.items() if name in values}
-    for part, value in told.items():
+    gains = {part: values[name] for part, name in found.names.items() if name in values}
+    for part, value in gains.items():
         if not math.isfinite(value):
             raise ValueError(f"{found.names[part]} = {value}: give a finite number")
-    scale = found.scale * told.get("overall", 1.0)
+    scale = found.scale * gains.get("overall", 1.0)
     proportional, integral, derivative = (
-        scale * told.get(part, 0.0) for part in ("proportional", "integral", "derivative")
+        scale * gains.get(part, 0.0) for part in ("proportional", "integral", "derivative")
     )
-    corner = told.get("corner", 0.0)
+    corner = gains.get("corner", 0.0)
     smooth = one_pole_filter(corner) if derivative and corner > 0.0 else None
     on_measurement = found.derivative_of == "measurement"
     return controller_from(proportional, integral, derivative, smooth, on_measurement)

@@ -52,7 +52,7 @@ def render(
 def _row(row: RuleFigures) -> tuple[str, ...]:
     """One rule, its gains and figures."""
     gains = ", ".join(f"{name} = {gain:.4g}" for name, gain in row.gains.items())
-    return (row.rule, gains, *(f"{one:.4g}" for one in row[2:]))
+    return (row.rule, gains, *(f"{number:.4g}" for number in row[2:]))
 
 
 def _explored(fit: PlantEstimate, loop: ControlLoop) -> Explorer | None:

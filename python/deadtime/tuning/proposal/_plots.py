@@ -48,23 +48,23 @@ def _draw(upper: Axes, lower: Axes, proposal: Proposal) -> None:
         own = (
             "as recorded" if proposal.shows_set_point else f"step of {proposal.set_point.size:.3g}"
         )
-        _one(upper, proposal, proposal.set_point, proposal.shows_set_point)
+        _draw_prediction(upper, proposal, proposal.set_point, proposal.shows_set_point)
         upper.set_title(f"set point, {own}", fontsize="medium")
     if proposal.load is not None:
-        _one(lower, proposal, proposal.load, proposal.shows_load)
+        _draw_prediction(lower, proposal, proposal.load, proposal.shows_load)
         lower.set_title(
             f"load of {proposal.load.size:.3g}, added to the command", fontsize="medium"
         )
 
 
-def _one(ax: Axes, proposal: Proposal, told: Prediction, shown: bool) -> None:
+def _draw_prediction(ax: Axes, proposal: Proposal, curve: Prediction, shown: bool) -> None:
     record = proposal.fit.recording
-    rows = (record.time >= told.time[0]) & (record.time <= told.time[-1])
-    if shown or told.kind == "set point":
-        label = "recorded" if told.kind == "set point" else "recorded, under that load"
+    rows = (record.time >= curve.time[0]) & (record.time <= curve.time[-1])
+    if shown or curve.kind == "set point":
+        label = "recorded" if curve.kind == "set point" else "recorded, under that load"
         ax.plot(record.time[rows], record.output[rows], label=label, **DATA)
-    ax.plot(told.time, told.target, label="set point", drawstyle="steps-post", **REFERENCE)
-    ax.fill_between(told.time, told.low, told.high, color=COLOURS[0], alpha=0.2, lw=0.0)
-    ax.plot(told.time, told.outputs, color=COLOURS[0], lw=1.6, label="predicted, with its band")
-    ax.set_xlim(float(told.time[0]), float(told.time[-1]))
+    ax.plot(curve.time, curve.target, label="set point", drawstyle="steps-post", **REFERENCE)
+    ax.fill_between(curve.time, curve.low, curve.high, color=COLOURS[0], alpha=0.2, lw=0.0)
+    ax.plot(curve.time, curve.outputs, color=COLOURS[0], lw=1.6, label="predicted, with its band")
+    ax.set_xlim(float(curve.time[0]), float(curve.time[-1]))
     ax.legend(frameon=False, fontsize="small")

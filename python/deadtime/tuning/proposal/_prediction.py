@@ -108,7 +108,9 @@ def predicted_load(fit: PlantEstimate, loops: Sequence[ControlLoop]) -> tuple[Pr
     Of a record without, to one as large as its own change of the command.
     """
     record = fit.recording
-    load = next((one for one in fit.causes if one.name == "load" and one.time is not None), None)
+    load = next(
+        (cause for cause in fit.causes if cause.name == "load" and cause.time is not None), None
+    )
     if load is not None and load.time is not None:
         start, size, seen = load.time, load.size, True
     else:

@@ -186,7 +186,7 @@ class Proposal(ReadOnlyArrays, Pictured):
 
         def worst(name: str) -> float:
             most = max if name.startswith("max_") else min
-            return most(float(getattr(one, name)) for one in each)
+            return most(float(getattr(margins, name)) for margins in each)
 
         return LeastMargins(*map(worst, LeastMargins._fields))
 
@@ -256,8 +256,10 @@ class Proposal(ReadOnlyArrays, Pictured):
             "estimate": self.fit.to_dict(),
         }
         found |= {
-            name: None if one is None else {"size": one.size, "start": one.start, "peak": one.peak}
-            for name, one in moves.items()
+            name: None
+            if move is None
+            else {"size": move.size, "start": move.start, "peak": move.peak}
+            for name, move in moves.items()
         }
         return plain_fields(found)
 

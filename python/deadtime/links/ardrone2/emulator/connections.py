@@ -125,7 +125,7 @@ class PortConnections:
 
     def of(self, host: str) -> list[Connection]:
         """The open connections of a host."""
-        return [one for one in self._open if one.host == host and one.is_open]
+        return [peer for peer in self._open if peer.host == host and peer.is_open]
 
     def close(self) -> None:
         """Close all connections."""

@@ -175,7 +175,7 @@ def _exponential(matrix: list[list[float]]) -> tuple[Row, ...]:
     for term in range(TERMS, 0, -1):
         product = _product(part, total)
         total = [
-            [one + x / term for one, x in zip(*rows, strict=True)]
+            [unit + x / term for unit, x in zip(*rows, strict=True)]
             for rows in zip(identity, product, strict=True)
         ]
     for _ in range(squarings):

@@ -156,10 +156,10 @@ class Sensors:
         )
         largest = (LARGEST_COUNT - ZERO_COUNT) / COUNTS_PER_G
         measured = [
-            force / GRAVITY + self._size * FORCE_NOISE * one
-            for force, one in zip(forces, noise, strict=True)
+            force / GRAVITY + self._size * FORCE_NOISE * error
+            for force, error in zip(forces, noise, strict=True)
         ]
-        x, y, z = (min(max(one, -largest), largest) for one in measured)
+        x, y, z = (min(max(value, -largest), largest) for value in measured)
         return x, y, z
 
     def _state(self, reading: Reading) -> int:

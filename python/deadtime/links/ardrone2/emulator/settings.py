@@ -70,7 +70,7 @@ class Settings:
     @property
     def asks_for_ids(self) -> bool:
         """Whether a CONFIG needs a CONFIG_IDS before it."""
-        return any(one != NO_ID for one in self.ids)
+        return any(identifier != NO_ID for identifier in self.ids)
 
     @property
     def outdoor(self) -> bool:
