@@ -70,9 +70,9 @@ REFUSED = [
     ),
     (
         ["bump.csv", "--loop", "roll"],
-        "--loop applies only to the form of a vehicle, but parallel is not",
+        "--loop applies only to a form for a vehicle, and --form parallel is none",
     ),
-    (["bump.csv", "--firmware", "4.5"], "--firmware applies only to the form of a vehicle"),
+    (["bump.csv", "--firmware", "4.5"], "--firmware applies only to a form for a vehicle"),
     (["bump.csv", "--filter-hz", 2], "--filter-hz belongs to a derivative"),
     (["bump.csv", "--controller", "PID", "--form", "px4", "--loop", "altitude"], "no integral"),
 ]

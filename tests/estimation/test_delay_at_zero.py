@@ -7,7 +7,7 @@ KNOWN = dtm.ControlLoop(
     dtm.Integrator(0.9, lag=0.2), dtm.P(1.0), delay=0.0, sample_time=0.065, limit=1.0
 )
 FREE = ("delay", "gain")
-WORDS = "the likelihood still rises towards zero"
+WORDS = "the likelihood still rises as the delay falls to zero"
 
 
 def fitted(seed, **vehicle):

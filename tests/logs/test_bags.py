@@ -101,10 +101,10 @@ def test_the_delay_of_the_robot_is_found_with_the_way_of_its_messages(folder):
     ("header", "asked", "used", "why"),
     [
         (1.0, None, "header", "by the times in the headers, because all topics have these times"),
-        (1.0, "received", "received", "by the times of reception, which were asked for"),
+        (1.0, "received", "received", "by the times of reception, as the argument stamps asks"),
         (False, None, "received", "because /cmd_vel has no other times"),
         (500.0, None, "received", "because the times in the headers come from different clocks"),
-        (1.0, "header", "header", "by the times in the headers, which were asked for"),
+        (1.0, "header", "header", "by the times in the headers, as the argument stamps asks"),
     ],
 )
 def test_times_of_all_topics_are_of_one_kind(tmp_path, header, asked, used, why):

@@ -54,7 +54,7 @@ def test_the_head_of_betaflight_3_makes_rates_of_sticks(tmp_path, revision):
     log = opened(tmp_path, data)
     for k, loop in enumerate(log.loops.values()):
         np.testing.assert_allclose(loop.setpoint.values, DEGREE * asked[:, k], rtol=1e-12)
-        assert "by the rates in the header" in loop.setpoint.conversion
+        assert "computed from the rates in the header" in loop.setpoint.conversion
         assert loop.followed > 0.7
 
 

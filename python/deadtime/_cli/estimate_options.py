@@ -70,7 +70,9 @@ Free = Annotated[
 ]
 Map = Annotated[
     OvershootMap | None,
-    typer.Option(help=("Formula by which the method overshoot converts overshoot to delay.")),
+    typer.Option(
+        help=("Formula with which --method overshoot computes the delay from the overshoot.")
+    ),
 ]
 Noise_path = Annotated[
     NoisePath | None,

@@ -201,8 +201,8 @@ def _check_form(form: Form, loop: str | None, firmware: str) -> None:
     if loops is None and (loop or firmware):
         option = "--loop" if loop else "--firmware"
         raise ValueError(
-            f"{option} applies only to the form of a vehicle, but {form} is not the form of a "
-            f"vehicle: leave {option} out, or give --form {', '.join(LOOPS_OF_FORMS)}"
+            f"{option} applies only to a form for a vehicle, and --form {form} is none: leave "
+            f"{option} out, or give --form {', '.join(LOOPS_OF_FORMS)}"
         )
     if loops is not None and loop not in loops:
         raise ValueError(

@@ -121,7 +121,7 @@ class FlightNoise:
                 f"wind (air) of {self.air:.3g} with a time constant of {self.air_time:.2g} s"
             )
         if self.air_walk:
-            parts.append(f"wind (air) that walks by {self.air_walk:.3g} per root of a second")
+            parts.append(f"wind (air) as a random walk of {self.air_walk:.3g} after 1 s")
         if self.trim:
             parts.append(f"trim of {self.trim:.3g}")
         if self.sensor:

@@ -64,7 +64,7 @@ def reference_shift(error: Array, loop: ControlLoop) -> Array:
         return error
     if loop.sample_time is None:
         raise ValueError(
-            "noise through the filter of a PV controller can be computed only on samples: give "
+            "the noise behind the filter of a PV controller is known only for a sampled loop: give "
             "the loop a sample_time, or use noise_in_loop=False"
         )
     if controller.Kp == 0.0:

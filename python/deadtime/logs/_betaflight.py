@@ -56,10 +56,10 @@ def _asked(axis: int, contents: LogContents) -> tuple[Signal, ...]:
     logged = Signal("main", (f"setpoint[{axis}]",), "deg/s")
     if has_rates(contents.firmware, contents.parameters):
         derive = curve_of_head(contents.parameters, axis)
-        rule = "in deg/s, by the rates in the header"
+        rule = "in deg/s, computed from the rates in the header"
         return logged, Signal("main", (stick,), "deg/s", derive=derive, rule=rule)
     columns = (stick, f"gyroADC[{axis}]", f"axisP[{axis}]")
-    rule = "in deg/s, by the controller's P term"
+    rule = "in deg/s, computed from the P term of the controller"
     derived = Signal("main", columns, "deg/s", derive=setpoint_of_controller, rule=rule)
     return logged, derived
 

@@ -109,9 +109,9 @@ class Figure11(Part):
         """What the figure shows."""
         slow = self.settling[-1]
         return (
-            "At Kv = 0.7 a ripple of the response ends just outside of the 2 % band. The model "
-            f"settles to 2 % after {slow.from_motion:.2f} s, and to 2.1 % after "
-            f"{slow.wider:.2f} s. The flight's {PRINTED[0.7]} s agrees with 2.1 %, but a "
+            "At Kv = 0.7 a peak of the response is just outside the 2 % band. The model "
+            f"settles within 2 % after {slow.from_motion:.2f} s, and within 2.1 % after "
+            f"{slow.wider:.2f} s. The {PRINTED[0.7]} s of the flight agree with the second time. A "
             "settling time that depends on such a small change is not meaningful.",
         )
 

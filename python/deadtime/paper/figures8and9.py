@@ -60,7 +60,7 @@ class Figure8(Part):
         """What the figure shows."""
         margin = 100.0 * (self.held_limit / GAINS[0] - 1.0)
         return (
-            f"Kp = 4 is stable, but in the sampled loop only {margin:.1f} % below the limit. "
+            f"Kp = 4 is stable. In the sampled loop Kp = 4 is only {margin:.1f} % below the limit. "
             f"With the hold of 65 ms the limit is {self.held_limit:.3f} instead of "
             f"{self.limit:.3f}.",
         )
@@ -95,7 +95,7 @@ def figure8() -> Figure8:
                 GAINS,
                 limit,
                 "π/(2 Td)",
-                note="with Kp = 5, the first whole number, the loop is unstable; with Kp = 4 it "
+                note="Kp = 5 is the smallest whole number with an unstable loop; with Kp = 4 it "
                 "is stable",
             ),
         ),

@@ -55,7 +55,7 @@ class Gap(Part):
         """The contributions to the difference of the estimates."""
         delays = (self.linear, self.saturated, self.simulation)
         steps = (
-            ("exact response instead of the dominant root", "dominant root"),
+            ("use of the exact response instead of the dominant root", "dominant root"),
             ("speed limited to 1 m/s", "saturation"),
             ("coarse steps instead of an exact simulation", "coarse steps"),
         )

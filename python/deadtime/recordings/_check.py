@@ -21,12 +21,12 @@ from deadtime.recordings._findings import Columns, Finding, Severity, seconds
 ORDER: tuple[Severity, ...] = ("refused", "warning", "note")
 
 _LAWS: dict[Law, str] = {
-    "exact": "the command is the controller's",
-    "late": "the command is the controller's, one row late",
-    "early": "the command is the controller's, one row early",
-    "approximate": "the command is nearly the controller's",
-    "differs": "the command is not the controller's",
-    "unknown": "it is unknown whether the command is the controller's",
+    "exact": "the command is what the controller computes",
+    "late": "the command is what the controller computes, one row late",
+    "early": "the command is what the controller computes, one row early",
+    "approximate": "the command is nearly what the controller computes",
+    "differs": "the command is not what the controller computes",
+    "unknown": "it is unknown whether the command is what the controller computes",
 }
 
 

@@ -157,7 +157,9 @@ def _other_spacing(
     if columns.sent is not None:
         soon = _hasty(columns.sent, sample_time)
         if soon > HASTE_SENT:
-            reason = f"commands have times of their own, and sample_time is {seconds(sample_time)}"
+            reason = (
+                f"commands have their own times, although sample_time is {seconds(sample_time)}"
+            )
             yield _no_such_hold(reason, soon, sample_time)
         return
     words = (

@@ -104,9 +104,9 @@ def _kinds() -> list[Kind]:
         ("packed by zstd", b"\x28\xb5\x2f\xfd", "unpack it"),
         ("a 7z archive", b"7z\xbc\xaf\x27\x1c", "unpack it"),
         ("a Feather file of version 1", b"FEA1", "save it as version 2, or as Parquet"),
-        ("a PNG picture", b"\x89PNG\r\n\x1a\n", "give a file with the numbers of the plot"),
-        ("a JPEG picture", b"\xff\xd8\xff", "give a file with the numbers of the plot"),
-        ("a PDF document", b"%PDF-", "give a file with the numbers of the plot"),
+        ("a PNG picture", b"\x89PNG\r\n\x1a\n", "give the file with the data of the plot"),
+        ("a JPEG picture", b"\xff\xd8\xff", "give the file with the data of the plot"),
+        ("a PDF document", b"%PDF-", "give the file with the data of the plot"),
     )
     return [
         Kind("", LFS_WHAT, _starts(LFS), None, "run `git lfs pull` in its repository"),

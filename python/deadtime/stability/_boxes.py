@@ -346,7 +346,7 @@ def _point(given: Mapping[str, SupportsFloat], ranges: Mapping[str, Range]) -> d
     point = {}
     for name, (low, high) in ranges.items():
         if name not in given and low < high:
-            raise ValueError(f"around has no {name}: give {', '.join(ranges)}")
+            raise ValueError(f"the point around= has no value for {name}: give {', '.join(ranges)}")
         point[name] = finite(name, given.get(name, low))
         if not low <= point[name] <= high:
             raise ValueError(

@@ -108,8 +108,8 @@ def stability_radius(
             )
     if len(names) > MOST_MOVING:
         raise ValueError(
-            f"more than {MOST_MOVING} parameters vary: for the other parameters, give a "
-            "value in at={...}"
+            f"{len(names)} parameters vary, but at most {MOST_MOVING} can: give a value for the "
+            "rest in at={...}"
         )
     known = family_of(family, names, at)
     found = native.stability_radius(

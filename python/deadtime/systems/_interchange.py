@@ -123,9 +123,9 @@ def rational(num: QuasiPolynomial, den: QuasiPolynomial, order: int | None) -> t
         return num.coefficients[0, ::-1].copy(), den.coefficients[0, ::-1].copy()
     if order is None:
         raise ValueError(
-            f"the system has a delay of {delays[-1]:g} s, which no rational transfer function "
-            "has exactly. Give pade=n for Padé approximants of order n, whose phase is wrong "
-            f"from about {2.0 / delays[-1]:.3g} n rad/s on"
+            f"the system has a delay of {delays[-1]:g} s, and a rational transfer function can "
+            "only approximate a delay. Give pade=n for Padé approximants of order n. Their phase "
+            f"is wrong above about n times {2.0 / delays[-1]:.3g} rad/s"
         )
     n = whole_number(
         "pade", order, limit=_HIGHEST_ORDER + 1, otherwise=", as polynomials in double precision"

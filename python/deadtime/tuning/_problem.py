@@ -77,8 +77,8 @@ class Problem(PickledByFields):
             return (self.given,)
         if not self.loop.plant.is_rational:
             raise ValueError(
-                "for this plant the search range of the gains is not known, because the plant "
-                "is not rational except for one delay in series: give ranges="
+                "the search range of the gains is known only for a rational plant with one "
+                "delay in series, and this plant is of another kind: give ranges="
             )
         return candidate_ranges(self.loop, self.free)
 

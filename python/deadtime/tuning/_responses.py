@@ -166,9 +166,8 @@ class Wanted:
         lost = (found.value - found.least) / abs(found.least)
         if lost > _NOTHING:
             words = (
-                "a step that settles earlier: without this demand "
-                f"{figure_in_words(self.objective, found.least)} (the demand costs "
-                f"{100.0 * lost:.2g} %)"
+                f"an earlier end of the step costs {100.0 * lost:.2g} %: without it "
+                f"{figure_in_words(self.objective, found.least)}"
             )
             made.append(Trade("load_slack", self.slack, lost, True, found.least, words))
         for name, asked in self.demands.named.items():

@@ -16,7 +16,9 @@ from deadtime.tuning._problem import controller_template
 SOURCES = {
     "SIMC": "Skogestad 2003, equations 23 to 25 with tau_c = theta, by the half rule (10, 11)",
     "AMIGO": "Astrom and Hagglund 2004",
-    "lambda": "Astrom and Hagglund 2006, chapter 6, with the larger of lag and three dead times",
+    "lambda": (
+        "Astrom and Hagglund 2006, chapter 6; closed-loop time constant max(lag, 3 dead times)"
+    ),
     "Ziegler-Nichols step": "Ziegler and Nichols 1942; Ti of PI is 3 L, not L/0.3, as in textbooks",
     "Ziegler-Nichols frequency": "Ziegler and Nichols 1942",
 }

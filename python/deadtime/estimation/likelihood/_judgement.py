@@ -25,7 +25,7 @@ WORDS = {
         "s the recording is more likely, so the plant lacks both"
     ),
     "below zero": (
-        "at a delay of zero the likelihood still rises towards "
+        "the likelihood still rises as the delay falls to "
         "zero, so the plant has too much lag, or lacks a zero"
     ),
     "change": (

@@ -230,7 +230,7 @@ def _stamps(
             "possible: give stamps='received'"
         )
     if asked is not None:
-        return asked, f"by the times {_of(asked)}, which were asked for"
+        return asked, f"by the times {_of(asked)}, as the argument stamps asks"
     if without:
         return "received", (
             f"by the times of reception, because {', '.join(without)} has no other times"

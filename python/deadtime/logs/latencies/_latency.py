@@ -332,7 +332,7 @@ def _sent_from_the_ground(log: Log, loops: list[LogLoop]) -> list[str]:
         return []
     half = log.link.half_round_trip
     long = (
-        "but this log does not show how long"
+        "but this log does not show how long the link takes"
         if half is None
         else f"at least {stated(2.0 * half, 0.0, 's')}"
     )

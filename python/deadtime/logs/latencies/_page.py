@@ -57,7 +57,10 @@ def moves_of_page(moves: Moves, fitted: Moves | None = None) -> dict[str, object
         figure = plot_moves(moves, fitted.median, fitted.response)
         of_fit = f". For the fit, at the same rows, it is {moves.shown(fitted.median)}"
     caption = sentence(f"{moves.headline()}{of_fit}")
-    drawn = "Thin lines: the response to each move, as a share of the change. Band: quartiles."
+    drawn = (
+        "Thin lines: the response to each move, divided by the change of the setpoint. "
+        "Band: quartiles."
+    )
     return {"figure": figure, "caption": f"{caption} {drawn}"}
 
 

@@ -64,14 +64,14 @@ def _unpacked(data: memoryview, limit: int) -> memoryview:
     unpacking = zlib.decompressobj()
     content = unpacking.decompress(data, limit)
     if not unpacking.eof:
-        raise ValueError(f"a variable is cut off, or has more than {limit} bytes when unpacked")
+        raise ValueError(f"a variable ends too early, or has more than {limit} bytes when unpacked")
     return memoryview(content)
 
 
 def _next(elements: Iterator[Element]) -> Element:
     found = next(elements, None)
     if found is None:
-        raise ValueError("a variable is cut off")
+        raise ValueError("a variable ends too early")
     return found
 
 

@@ -123,7 +123,7 @@ class _Checker:
             c, d = -d, -c
         re, im = claimed.closed
         if not all(map(math.isfinite, (*re, *im))):
-            fail("its closed region is not finite")
+            fail("the region with a proved contour has an infinite side")
         radius = math.inf
         if math.isinf(c) or math.isinf(d):
             if claimed.beyond is None:

@@ -80,7 +80,10 @@ def _check_numbers(claims: Claims) -> None:
             f"factors {claims.factors}"
         )
     if claims.limit is None and claims.least_factor != min(claims.factors):
-        _fail("without a limit, its least factor must be one of the factors")
+        _fail(
+            f"the command has no limit, so its least factor must be {min(claims.factors):g}, the "
+            f"smallest of its factors, not {claims.least_factor:g}"
+        )
     if claims.limit is not None and claims.limit <= 0.0:
         _fail(f"its limit is {claims.limit:g}, but a limit must be above zero")
     for first, last in claims.ages:
@@ -247,7 +250,7 @@ class _Checker:
             for i in range(self.size):
                 bound[i][i] -= most * most * radius * self.size
             if not _is_positive(whole(bound)[0]):
-                _fail("its form does not bound the command")
+                _fail("the quadratic form of the proof does not bound the command")
         start = list(self.plant.rest)
         start += [Enclosed(1), Enclosed(0)] if self.smooth is not None else []
         energy = Enclosed(0)

@@ -350,7 +350,7 @@ def _proved(
     """The claims with a form and the largest factors for which there is one, and their share."""
 
     def attempt(share: float) -> Claims | None:
-        report(f"searching a proof with {100.0 * share:.0f} % of the faster gains")
+        report(f"searching for a proof with the faster gains reduced to {100.0 * share:.0f} %")
         lowered = tuple(1.0 + share * (factor - 1.0) for factor in factors)
         return _attempt(replace(claims, factors=lowered), step)
 

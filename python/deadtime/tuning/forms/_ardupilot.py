@@ -32,7 +32,7 @@ ACCELERATION = 100.0 * 0.001
 
 BOTH = "The parameters apply to north and east together."
 SMALL = (
-    "For errors that are large compared with its acceleration limit, the firmware uses a "
+    "The firmware limits the acceleration, so for large errors it uses a "
     "square-root law. The gain applies to small errors."
 )
 

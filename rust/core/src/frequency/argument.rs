@@ -151,8 +151,8 @@ impl<'a> Way<'a> {
             }
             refuse_if!(
                 self.intervals > MOST,
-                "up to {end:e} rad/s, the phase needs more than {MOST} intervals, because no term \
-                 dominates the others near {a:e}: give lower frequencies"
+                "the phase up to {end:e} rad/s would need more than {MOST} intervals, because near \
+                 {a:e} rad/s no term dominates: give lower frequencies"
             );
             match self.turned(a, b) {
                 Some(turned) => self.argument += turned,

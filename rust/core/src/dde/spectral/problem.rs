@@ -207,8 +207,8 @@ impl Problem {
         let needed = self.start - self.memory() * (1.0 - HISTORY_ROUNDING);
         if let Some(first) = first.filter(|first| *first > needed) {
             return refuse(format!(
-                "the history starts at {first}: give the history from {} on, the start minus the \
-                 largest delay",
+                "the history begins at {first}: give the history from {} on, which is the start of \
+                 the solution minus the largest delay",
                 self.start - self.memory()
             ));
         }

@@ -116,7 +116,7 @@ pub(super) fn roots(system: &Irreducible, region: &Region, task: &Task) -> Resul
 pub(super) fn rightmost(system: &Irreducible, n: usize, task: &Task) -> Result<RootSet, Error> {
     refuse_if!(
         n == 0 || n > MAX_WANTED,
-        "n={n}: give a number of roots from 1 to {MAX_WANTED} for a matrix"
+        "n={n}: for a matrix, the number of roots has to be from 1 to {MAX_WANTED}"
     );
     check_regular(system)?;
     let mut prepared = Prepared::new(system)?;

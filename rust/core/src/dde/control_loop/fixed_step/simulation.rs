@@ -330,7 +330,7 @@ fn check(blocks: &Blocks, settings: &Settings, rest: &Rest) -> Result<(), Error>
     );
     refuse_if!(
         settings.sample_steps == Some(0),
-        "the sample time is shorter than a step"
+        "the sample time is shorter than a step of the simulation"
     );
     if settings.steps > MOST_STEPS {
         return Err(Error::TooMuch {
