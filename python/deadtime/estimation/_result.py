@@ -482,7 +482,7 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
             noises = [str(run.noise) for run in self.runs if run.noise is not None]
             lines.append(
                 f"  Cramér-Rao bound {stated(bound, math.nan, 's')}, for "
-                f"{' | '.join(noises) or self.crb.noise} with {', '.join(self.crb.free)} free"
+                f"{' | '.join(noises) or self.crb.noise} and unknown {', '.join(self.crb.free)}"
             )
         lines += self._felt_lines()
         kind = "white" if self.whiteness.white else "coloured"

@@ -134,8 +134,8 @@ class Moves(ReadOnlyArrays):
         low, high = self.interval
         if math.isnan(low):
             return (
-                f"{known} {stated(self.median, 0.0, 's')}, but there are too few moves for an "
-                "interval"
+                f"{known} {stated(self.median, 0.0, 's')}, without a confidence interval, "
+                "because the setpoint moves too few times"
             )
         error = 0.25 * (high - low)
         covered = f"{100.0 * self.coverage:.0f} %"

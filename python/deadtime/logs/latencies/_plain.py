@@ -203,7 +203,11 @@ def plain_times(
         found = moves_of(setpoint, response, segments, longest=longest, between=between)
     else:
         found = aligned(moves, setpoint, response, between=between)
-    few = "" if np.isfinite(found.interval[0]) else "there are too few moves for an interval"
+    few = (
+        ""
+        if np.isfinite(found.interval[0])
+        else "the setpoint moves too few times for a confidence interval"
+    )
     of_moves = PlainTime(
         "moves", "delay + 0.69 lag after jumps, delay + lag after ramps", found.median,
         found.interval, math.nan, found.count, found.reason or few, found.times,

@@ -317,7 +317,7 @@ class _Checker:
         if not 0 <= part.reference < len(self.function.rows) or not (
             part.error >= 0 and part.bend >= 0
         ):
-            fail("a segment of the real axis has a number that is not possible")
+            fail("the bounds of a segment of the real axis are negative, or belong to no term")
         start, end, middle = map(Fraction, (part.start, part.end, part.middle))
         radius = max(end - middle, middle - start)
         slope, error, bend = map(Fraction, (part.slope, part.error, part.bend))
