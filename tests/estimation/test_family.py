@@ -166,7 +166,7 @@ def test_other_levels_need_no_second_fit():
     for name, ends in wide.hull.items():
         assert found.hull_at(0.99)[name] == pytest.approx(ends, rel=1e-9)
     assert found.hull_at(0.95) == found.hull
-    with pytest.raises(ValueError, match=r"level 1\.5"):
+    with pytest.raises(ValueError, match=r"the level is 1\.5"):
         found.hull_at(1.5)
 
 
@@ -197,11 +197,11 @@ def test_noise_alone_is_no_response():
     [
         ({"time": np.zeros(40)}, "times must increase"),
         ({"command": np.full(40, np.nan)}, "commands must be finite"),
-        ({"output": np.full(40, np.nan)}, "0 rows count"),
-        ({"largest_delay": -1.0}, "largest delay -1"),
+        ({"output": np.full(40, np.nan)}, "only 0 rows with a known output"),
+        ({"largest_delay": -1.0}, "the largest delay is -1"),
         ({"plant": "lags"}, 'plant "lags" is not known'),
         ({"kind": "steps"}, 'kind "steps"'),
-        ({"level": 2.0}, "level 2"),
+        ({"level": 2.0}, "the level is 2"),
     ],
 )
 def test_wrong_input_is_named(change, words):

@@ -61,7 +61,7 @@ def test_where_no_lag_would_be_seen_it_is_infinite():
     fit = dtm.estimate_delay(recording, known, free=("delay", "gain", "lag"))
     assert fit.verdict == "reliable", fit.message
     assert np.isinf(fit.details["unseen_lag"])
-    assert "no further lag would have been found" in fit.message
+    assert "no further lag would have been seen" in fit.message
     # Nor is it: the fitted lag becomes the longer of both, and the delay takes the shorter.
     found = 0
     for seed, second in enumerate((0.06, 0.2, 0.5, 1.0)):

@@ -270,7 +270,7 @@ BAD_HEADS = {
     "no number": (b"I encoding:1,1", b"I encoding:1,x", '"Field I encoding" .* damaged'),
     "no code": (b"I encoding:1,1", b"I encoding:1,2", "encoding 2 of a field is not known"),
     "no predictor": (b"P predictor:6,2", b"P predictor:6,99", "predictor 99"),
-    "half a group": (b"S encoding:1,1,7", b"S encoding:1,1,1", "takes 3 together"),
+    "half a group": (b"S encoding:1,1,7", b"S encoding:1,1,1", "2 fields have an encoding for groups of 3"),
     "names of slow frames": (b"S name:flightModeFlags,", b"S name:", "4 fields of S frames"),
 }
 
@@ -388,7 +388,7 @@ def test_few_bytes_that_pretend_to_hold_many_values_are_refused():
     tracemalloc.stop()
     assert peak < (50 << 20) + 10 * len(data)
     many = Log(fields=[(f"f[{k}]", 1, (0, SIGNED), (1, SIGNED)) for k in range(600)])
-    with pytest.raises(RecordingError, match="512 at most"):
+    with pytest.raises(RecordingError, match="at most 512 are allowed"):
         read_blackbox(many.head() + b"I\0\0" + END, "wide.bbl")
 
 

@@ -100,10 +100,10 @@ def test_an_injected_signal_is_the_setpoint_of_its_axis_alone(opened):
     )
     assert followed(log) == {
         "pitch": 6.0,
-        "response of the roll rate to the injected signal": 2.0,
-        "response of pitch to the injected signal": 2.0,
+        "roll rate from the injected signal": 2.0,
+        "pitch from the injected signal": 2.0,
     }
-    loop = log.loops["response of the roll rate to the injected signal"]
+    loop = log.loops["roll rate from the injected signal"]
     assert np.array(loop.segments) == pytest.approx(np.array([(1.0, 3.0)]), abs=0.03)
     assert np.abs(loop.setpoint.values).max() == pytest.approx(10.0 * DEGREE, rel=1e-3)
     assert loop.response.source == "SIDD.Gx"

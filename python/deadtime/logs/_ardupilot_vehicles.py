@@ -104,12 +104,12 @@ def injected(conditions: tuple[Condition, ...]) -> list[LoopNames]:
     for axis, column, gyro, angles, rate in INJECTED:
         loops += [
             LoopNames(
-                f"response of the {axis} rate to the injected signal", axis, "rate",
+                f"{axis} rate from the injected signal", axis, "rate",
                 (Signal("SIDD", ("Targ",), "deg/s"),), (Signal("SIDD", (gyro,), "deg/s"),),
                 conditions=(*running, _on((rate,))),
             ),
             LoopNames(
-                f"response of {axis} to the injected signal", axis, "attitude",
+                f"{axis} from the injected signal", axis, "attitude",
                 (Signal("SIDD", ("Targ",), "deg"),), (Signal("ATT", (column,), "deg"),),
                 conditions=(*running, _on(angles)),
             ),

@@ -232,7 +232,7 @@ def parse_navdata(packet: bytes, *, checksum: bool = True) -> Navdata:
     1.25
     >>> parse_navdata(packet[:-8])
     Traceback (most recent call last):
-    deadtime._base.errors.PacketError: navdata: the last option is no checksum, at byte 164
+    deadtime._base.errors.PacketError: navdata: the last option is not a checksum, at byte 164
     """
     read = navdata_read(packet, checksum)
     known: dict[str, Any] = {}
