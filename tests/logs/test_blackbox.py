@@ -270,7 +270,11 @@ BAD_HEADS = {
     "no number": (b"I encoding:1,1", b"I encoding:1,x", '"Field I encoding" .* damaged'),
     "no code": (b"I encoding:1,1", b"I encoding:1,2", "encoding 2 of a field is not known"),
     "no predictor": (b"P predictor:6,2", b"P predictor:6,99", "predictor 99"),
-    "half a group": (b"S encoding:1,1,7", b"S encoding:1,1,1", "2 fields have an encoding for groups of 3"),
+    "half a group": (
+        b"S encoding:1,1,7",
+        b"S encoding:1,1,1",
+        "2 fields have an encoding for",
+    ),
     "names of slow frames": (b"S name:flightModeFlags,", b"S name:", "4 fields of S frames"),
 }
 

@@ -157,8 +157,8 @@ mod tests {
         let found = filled("the test", 0.0, 1 << 58);
         assert_eq!(
             found.unwrap_err().to_string(),
-            "the test needs 2048.000 PiB of memory, which is not available: ask for less \
-             at once, or raise the limit"
+            "the test needs 2048.000 PiB of memory, which is not available: compute less \
+             at once, or raise the limit of memory"
         );
         assert!(reserved::<f64>("the test", usize::MAX).is_err());
     }
