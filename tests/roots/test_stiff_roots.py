@@ -51,5 +51,5 @@ def test_half_planes_of_stiff_equations_are_counted():
 def test_roots_that_no_line_separates_are_refused_with_the_reason():
     """Along a chain of millions of roots, |s + 1e8 e^(−1e-8 s)| is equal to 15 digits."""
     h = s + 1e8 * delay(1e-8) + delay(1.0)
-    with pytest.raises(ValueError, match="differ too much in size"):
+    with pytest.raises(ValueError, match="differ too much for double precision"):
         h.rightmost()

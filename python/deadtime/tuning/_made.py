@@ -102,7 +102,7 @@ def _trades(search: Search, found: Found, margins: LeastMargins, value: float) -
         if problem.region is not None:
             known = "exactly as estimated"
         words = (
-            f"effect of the uncertainty of {names}: without it (values {known}) "
+            f"effect of the uncertainty of the {names}: without it (values {known}) "
             f"{figure_in_words(objective, without)} ({_part(price)})"
         )
         made.append(Trade("interval", math.nan, math.nan, price > _NOTHING, without, words))
