@@ -44,7 +44,8 @@ cross-correlation of the field's tools (`rate_loops`).
 Run ``python benches/estimation.py --strangers [--runs N] [--rows TEXT,TEXT] [--seed S]
 [--json FILE] [--quick]`` to estimate on plants and faults that the estimator does not know. Faults
 are in two sizes, which move an answer by 1 and 5 standard errors, and the truth is a range
-(`strangers`). The lot that chose the faults has the seed 20261203.
+(`strangers`). The lot that chose the faults has the seed 20261203. With ``--oracle`` the widths are
+those of fits that know the noise, without faults (`strangers.oracle`).
 
 Run ``python benches/estimation.py --gains [--runs N] [--seed S] [--quick]`` to propose gains from
 500 bump tests, PI loops and height steps in wind with small faults, and to print stability and
@@ -81,6 +82,7 @@ from reality.oracle_table import print_oracle
 from reality.table import chosen, free_of, print_table
 from strangers import rows as strangers
 from strangers.gains import print_gains
+from strangers.oracle import print_strangers_oracle
 from strangers.table import print_strangers
 
 SAMPLE = 0.065
@@ -555,6 +557,10 @@ def main() -> None:
         except ValueError as error:
             parser.error(str(error))
         runs = given.runs or (2 if given.quick else None)
+        if given.oracle:
+            kinds = [row.kind for row in rows if row.fault is None]
+            print_strangers_oracle(kinds, runs or 100, given.seed or 0, given.processes)
+            return
         print_strangers(rows, runs, given.seed or 0, given.processes, given.json)
         return
     if given.reality:

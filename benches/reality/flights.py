@@ -42,6 +42,7 @@ from deadtime.links import Limits, VehicleState, now
 from deadtime.links.mavlink import MAVLinkVehicle
 from deadtime.links.mavlink.codec import dialect
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 Array = NDArray[np.float64]
 
@@ -252,8 +253,6 @@ def write(
 
     `place` says which log of the vehicle holds the flight, and under which number.
     """
-    from scipy.interpolate import CubicHermiteSpline
-
     rate, offset, misfit = clock_of(log.positions)
     table = np.array(log.positions)
     table = table[np.r_[True, np.diff(table[:, 1]) > 0.0]]
@@ -301,7 +300,8 @@ async def session(folder: Path, flights: Sequence[Flight]) -> None:
                     await set_wind(vehicle, wind := flight.wind)
             log = await fly(vehicle, flight, number)
             place = {"log": f"{flights[0].name}.bin", "number": number}
-            write(folder, flight, log, parameters, place)
+            async with hovering(vehicle):  # beside the link, which must not wait
+                await asyncio.to_thread(write, folder, flight, log, parameters, place)
             print(flight.name, flush=True)
 
 

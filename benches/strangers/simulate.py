@@ -101,19 +101,36 @@ class Plants:
 
 
 class LimitedPlants:
-    """An integrator behind a lag whose output has a largest slope."""
+    """An integrator behind a lag whose output has a largest slope, and behind it a further lag.
+
+    Zeros act on the output.
+    """
 
     def __init__(self, linear: Linear, step: Array) -> None:
-        self.gain, self.lag, self.limit = linear.gain, linear.lags[:, 0], linear.acceleration
-        self.step, self.output, self.velocity = step, np.zeros(step.size), np.zeros(step.size)
+        self.gain, self.limit = linear.gain, linear.acceleration
+        self.lag, *self.further = linear.lags.T
+        self.zero, self.step = linear.zeros.sum(axis=1), step
+        self.position, self.wanted, self.velocity = (np.zeros(step.size) for _ in range(3))
 
     def move(self, first: Array, second: Array, share: Array) -> None:
         """Step with one command, then with another for this share of the part."""
         for command, long in ((first, (1.0 - share) * self.step), (second, share * self.step)):
-            wanted = -np.expm1(-long / self.lag) * (self.gain * command - self.velocity)
-            change = np.clip(wanted, -self.limit * long, self.limit * long)
-            self.output = self.output + long * (self.velocity + 0.5 * change)
-            self.velocity = self.velocity + change
+            change = -np.expm1(-long / self.lag) * (self.gain * command - self.wanted)
+            change = np.clip(change, -self.limit * long, self.limit * long)
+            way, self.wanted = long * (self.wanted + 0.5 * change), self.wanted + change
+            if not self.further:
+                self.velocity = self.wanted
+            for lag in self.further:
+                slope = change / np.maximum(long, np.finfo(float).tiny)
+                off = self.velocity - (self.wanted - change) + slope * lag
+                last = self.velocity
+                self.velocity = self.wanted - slope * lag + off * np.exp(-long / lag)
+                way = way - lag * (self.velocity - last)
+            self.position = self.position + way
+
+    @property
+    def output(self) -> Array:
+        return np.asarray(self.position + self.zero * self.velocity)
 
 
 def plants_of(linear: Linear, step: Array) -> Plants | LimitedPlants:

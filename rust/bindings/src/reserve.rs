@@ -12,7 +12,7 @@ use std::ptr::null_mut;
 use std::sync::atomic::{AtomicPtr, Ordering};
 
 use deadtime::Error;
-use deadtime::memory::{HEADROOM, end_shortage, no_room, report_shortage};
+use deadtime::memory::{HEADROOM, end_shortage, out_of_memory, report_shortage};
 
 #[global_allocator]
 static ALLOCATOR: Reserve = Reserve {
@@ -50,7 +50,7 @@ impl Reserve {
         // SAFETY: the layout has a size.
         let memory = unsafe { System.alloc(KEPT) };
         if memory.is_null() {
-            return Err(no_room("the call", KEPT.size()));
+            return Err(out_of_memory("the call", KEPT.size()));
         }
         let before = self.kept.swap(memory, Ordering::AcqRel);
         if !before.is_null() {

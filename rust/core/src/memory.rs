@@ -49,16 +49,16 @@ fn there_is(bytes: usize) -> bool {
 }
 
 /// Return an error if memory for `count` items of type `T` is not available.
-pub fn room<T>(what: &'static str, count: usize) -> Result<(), Error> {
+pub fn require<T>(what: &'static str, count: usize) -> Result<(), Error> {
     let bytes = count.saturating_mul(size_of::<T>());
     if bytes < SMALL || there_is(bytes.saturating_add(HEADROOM)) {
         return Ok(());
     }
-    Err(no_room(what, bytes))
+    Err(out_of_memory(what, bytes))
 }
 
 /// The error where so many bytes cannot be had.
-pub fn no_room(what: &'static str, bytes: usize) -> Error {
+pub fn out_of_memory(what: &'static str, bytes: usize) -> Error {
     Error::Memory {
         what,
         bytes: bytes as u64,
@@ -67,10 +67,10 @@ pub fn no_room(what: &'static str, bytes: usize) -> Error {
 
 /// An empty vector that holds `count` items without growing.
 pub fn reserved<T>(what: &'static str, count: usize) -> Result<Vec<T>, Error> {
-    room::<T>(what, count)?;
+    require::<T>(what, count)?;
     let mut made = Vec::new();
     made.try_reserve_exact(count)
-        .map_err(|_| no_room(what, count.saturating_mul(size_of::<T>())))?;
+        .map_err(|_| out_of_memory(what, count.saturating_mul(size_of::<T>())))?;
     Ok(made)
 }
 
@@ -118,9 +118,9 @@ pub fn append<T: Copy>(what: &'static str, to: &mut Vec<T>, values: &[T]) -> Res
 pub fn push_back<T>(what: &'static str, to: &mut VecDeque<T>, value: T) -> Result<(), Error> {
     if to.len() == to.capacity() {
         let most = to.len().saturating_add(to.len().max(1));
-        room::<T>(what, most)?;
+        require::<T>(what, most)?;
         to.try_reserve(1)
-            .map_err(|_| no_room(what, most.saturating_mul(size_of::<T>())))?;
+            .map_err(|_| out_of_memory(what, most.saturating_mul(size_of::<T>())))?;
     }
     to.push_back(value);
     Ok(())
@@ -128,9 +128,9 @@ pub fn push_back<T>(what: &'static str, to: &mut VecDeque<T>, value: T) -> Resul
 
 fn grow<T>(what: &'static str, to: &mut Vec<T>, more: usize) -> Result<(), Error> {
     let most = to.len().saturating_add(more.max(to.len()));
-    room::<T>(what, most)?;
+    require::<T>(what, most)?;
     to.try_reserve(more)
-        .map_err(|_| no_room(what, most.saturating_mul(size_of::<T>())))
+        .map_err(|_| out_of_memory(what, most.saturating_mul(size_of::<T>())))
 }
 
 /// A size in readable units.

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::Error;
-use crate::memory::{HEADROOM, is_scarce, is_short, no_room};
+use crate::memory::{HEADROOM, is_scarce, is_short, out_of_memory};
 
 /// Checks between two readings of the clock, which cost more than a check.
 const CHECKS: u64 = 32;
@@ -125,7 +125,7 @@ impl Task {
         }
         let is_stopped = self.stop.load(Ordering::Relaxed);
         if is_short() || (is_stopped && self.scarce.load(Ordering::Relaxed)) {
-            Err(no_room("the rest of the computation", HEADROOM))
+            Err(out_of_memory("the rest of the computation", HEADROOM))
         } else if !is_stopped {
             Ok(())
         } else {

@@ -18,7 +18,7 @@ mod roots;
 
 use exchange::answered;
 
-/// Make room for `count` numbers of a request, and return where they go.
+/// Reserve memory for `count` numbers of a request, and return where they go.
 #[unsafe(no_mangle)]
 pub extern "C" fn reserve(count: usize) -> *mut f64 {
     exchange::reserve(count)

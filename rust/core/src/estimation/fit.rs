@@ -263,7 +263,7 @@ impl Model {
             sums.push(self.penalty(&at));
         }
         for (run, (rows, noise)) in self.runs.iter().zip(&point.noise).enumerate() {
-            // A page has no room for the fast way.
+            // A page does without the fast method, to stay small.
             let all = if cfg!(target_family = "wasm") {
                 None
             } else {

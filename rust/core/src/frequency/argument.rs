@@ -91,11 +91,11 @@ fn beyond_lower_powers(h: &QuasiPolynomial) -> (f64, usize) {
     let c = h.coefficients().iter().position(|row| lead(row) == largest);
     let mut lower = moduli(h);
     let all = lower.pop().unwrap_or(0.0);
-    let room = 2.0 * largest - all;
-    let radius = if room <= ROOM * largest {
+    let margin = 2.0 * largest - all;
+    let radius = if margin <= ROOM * largest {
         f64::INFINITY
     } else {
-        0.5 * fujiwara(&lower, room * LOST)
+        0.5 * fujiwara(&lower, margin * LOST)
     };
     (radius, c.unwrap_or(0))
 }

@@ -16,12 +16,12 @@ pub(super) const ROOM: f64 = 1e-12;
 pub(super) struct Lead {
     pairs: Vec<(f64, f64)>,
     /// Part of the first modulus that is kept for the rounding of the sum.
-    room: f64,
+    margin: f64,
 }
 
 impl Lead {
     /// Those of a + k b.
-    pub(super) fn of(a: &QuasiPolynomial, b: &QuasiPolynomial, room: f64) -> Self {
+    pub(super) fn of(a: &QuasiPolynomial, b: &QuasiPolynomial, margin: f64) -> Self {
         let degree = a.degree().max(b.degree());
         let mut delays: Vec<f64> = a.delays().iter().chain(b.delays()).copied().collect();
         delays.sort_by(f64::total_cmp);
@@ -34,7 +34,7 @@ impl Lead {
         let pairs = delays.into_iter().map(|delay| (at(a, delay), at(b, delay)));
         Self {
             pairs: pairs.collect(),
-            room,
+            margin,
         }
     }
 
@@ -42,7 +42,7 @@ impl Lead {
     pub(super) fn reserve(&self, k: f64) -> f64 {
         let mut sizes = self.pairs.iter().map(|(a, b)| (a + k * b).abs());
         let first = sizes.next().unwrap_or(0.0);
-        first * (1.0 - self.room) - sizes.sum::<f64>()
+        first * (1.0 - self.margin) - sizes.sum::<f64>()
     }
 
     /// The parts of `low` ≤ k ≤ `high` in which the reserve is not above zero.

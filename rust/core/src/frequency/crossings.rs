@@ -54,10 +54,10 @@ fn crossings_of_gain(
     task: &Task,
 ) -> Result<Crossings, Error> {
     let lead = Lead::of(&equation.factor(0)?, &equation.factor(1)?, ROOM);
-    let room = NEAR_CHAINS * (high - low);
+    let margin = NEAR_CHAINS * (high - low);
     let mut unlisted: Vec<(f64, f64)> = Vec::new();
     for (start, end) in lead.lost(low, high) {
-        let (start, end) = ((start - room).max(low), (end + room).min(high));
+        let (start, end) = ((start - margin).max(low), (end + margin).min(high));
         match unlisted.last_mut() {
             Some(last) if start <= last.1 => last.1 = end,
             _ => unlisted.push((start, end)),

@@ -148,7 +148,7 @@ impl Crossover {
     }
 
     /// The same, or where ω times `whole` seconds is less than one the delay for it, in units of that.
-    pub(super) fn room(&self, whole: f64) -> f64 {
+    pub(super) fn margin(&self, whole: f64) -> f64 {
         self.distance() * (1.0 / (self.omega * whole)).max(1.0)
     }
 }

@@ -414,7 +414,7 @@ impl<M: Members> Search<'_, M> {
         let sizes = factors.iter().map(|factor| factor.gain.ln().abs());
         let turns = crossovers(&numbers, self.task)?;
         let whole = held.sample_time() + held.delay();
-        let turns = turns.iter().map(|at| at.room(whole));
+        let turns = turns.iter().map(|at| at.margin(whole));
         Ok(sizes.chain(turns).fold(ALIKE, f64::min))
     }
 
@@ -437,8 +437,8 @@ impl<M: Members> Search<'_, M> {
         let start = (held.fastest_oscillation(DECAYED), 1.0f64);
         let (fastest, distance) = turns
             .chain(factors)
-            .fold(start, |(most, least), (omega, room)| {
-                (most.max(omega), least.min(room))
+            .fold(start, |(most, least), (omega, margin)| {
+                (most.max(omega), least.min(margin))
             });
         Ok((held.fastest() + fastest) * period < CONTINUOUS * distance)
     }

@@ -81,12 +81,12 @@ fn square(probe: &mut Probe<'_>, omega: f64) -> [Known; 2] {
     let (modulus, steep) = (size.sqrt(), jet.slope.norm_sqr().sqrt());
     let (error, slope_error) = (jet.value_error, jet.slope_error);
     let slope = 2.0 * (jet.value.im * jet.slope.re - jet.value.re * jet.slope.im);
-    let room = 1.0 + 1e-9;
+    let margin = 1.0 + 1e-9;
     [
-        (size, room * error * (2.0 * modulus + error) + LAST * size),
+        (size, margin * error * (2.0 * modulus + error) + LAST * size),
         (
             slope,
-            room * 2.0 * (error * steep + slope_error * modulus + error * slope_error)
+            margin * 2.0 * (error * steep + slope_error * modulus + error * slope_error)
                 + LAST * 2.0 * modulus * steep,
         ),
     ]

@@ -50,18 +50,18 @@ fn check_taylor(
     r: f64,
 ) -> Result<(), TestCaseError> {
     let here = f.taylor(omega);
-    let (value, room) = exact(omega);
-    prop_assert!((here.values[0] - value).abs() <= here.errors[0] + room);
-    prop_assert!((f.value(omega) - value).abs() <= here.errors[0] + room);
-    let (mut sum, mut off, mut power) = (0.0, room, 1.0);
+    let (value, margin) = exact(omega);
+    prop_assert!((here.values[0] - value).abs() <= here.errors[0] + margin);
+    prop_assert!((f.value(omega) - value).abs() <= here.errors[0] + margin);
+    let (mut sum, mut off, mut power) = (0.0, margin, 1.0);
     for k in 0..ORDER {
         sum += here.values[k] * power;
         off += here.errors[k] * power;
         power *= r / (k + 1) as f64;
     }
     off += f.bound(omega + r) * power;
-    let (there, room) = exact(omega + r);
-    prop_assert!((there - sum).abs() <= off + room + f.taylor(omega + r).errors[0]);
+    let (there, margin) = exact(omega + r);
+    prop_assert!((there - sum).abs() <= off + margin + f.taylor(omega + r).errors[0]);
     let (change, _) = here.change(r, f.bound(omega + r));
     prop_assert!((there - value).abs() <= change + here.errors[0] + off);
     Ok(())

@@ -53,14 +53,14 @@ impl Waves {
 
     fn folded(sum: &TwoSided, turns: usize, clean: bool) -> Self {
         let sign = if turns.is_multiple_of(2) { -1.0 } else { 1.0 };
-        let room = SAME_DELAY * sum.longest;
+        let margin = SAME_DELAY * sum.longest;
         let rows = sum.rows.iter().map(|row| {
-            let mut row = if row.delay < -room {
+            let mut row = if row.delay < -margin {
                 row.mirrored(sign)
             } else {
                 row.clone()
             };
-            if row.delay.abs() <= room {
+            if row.delay.abs() <= margin {
                 row.delay = 0.0;
                 for k in (0..row.values.len()).filter(|k| (k + turns).is_multiple_of(2)) {
                     erase(&mut row, k);

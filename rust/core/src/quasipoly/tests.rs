@@ -109,10 +109,10 @@ fn sums_of_delays_in_another_order_are_the_same_delay() {
 proptest! {
     #[test]
     fn algebra_acts_pointwise(a in any(), b in any(), s in point()) {
-        let room = 1e-12 * (1.0 + size(&a, s)) * (1.0 + size(&b, s));
+        let margin = 1e-12 * (1.0 + size(&a, s)) * (1.0 + size(&b, s));
         let (x, y) = (a.value(s), b.value(s));
         let close = |h: Result<QuasiPolynomial, Error>, wanted: Complex64| {
-            h.is_ok_and(|h| (h.value(s) - wanted).norm() <= room)
+            h.is_ok_and(|h| (h.value(s) - wanted).norm() <= margin)
         };
         prop_assert!(close(a.add(&b), x + y));
         prop_assert!(close(a.sub(&b), x - y));

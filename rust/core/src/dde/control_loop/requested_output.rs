@@ -4,7 +4,7 @@ use super::series::{BLOCK, Series};
 use crate::Error;
 use crate::dde::limits::RESPONSE;
 use crate::dde::scalar::Scalar;
-use crate::memory::{push, reserved, room};
+use crate::memory::{push, require, reserved};
 
 /// Result of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -52,7 +52,7 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
         input_times: &'a [f64],
         ahead: S,
     ) -> Result<Self, Error> {
-        room::<S>(RESPONSE, output_times.len() + input_times.len())?;
+        require::<S>(RESPONSE, output_times.len() + input_times.len())?;
         Ok(Self {
             output_times,
             input_times,

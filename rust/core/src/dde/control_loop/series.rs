@@ -151,7 +151,7 @@ impl<S: Scalar> Series<S> {
         self.coefficients[0] = value;
     }
 
-    /// Make room for terms up to `degree`, which the caller writes; those above become zero.
+    /// Add terms up to `degree`, which the caller writes; those above become zero.
     #[inline]
     pub(crate) fn set_degree(&mut self, degree: usize) {
         if self.degree > degree {

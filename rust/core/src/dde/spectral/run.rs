@@ -268,13 +268,13 @@ impl<'a> Run<'a> {
         let end = self.problem.end;
         let last = ahead >= end - 2.0 * SHORTEST * end.abs().max(start.abs());
         let stop = if last { end } else { ahead };
-        let room = stop - start;
-        if room <= length * (1.0 + WHOLE_PARTS) {
+        let margin = stop - start;
+        if margin <= length * (1.0 + WHOLE_PARTS) {
             return stop;
         }
-        let parts = (room / length * (1.0 - WHOLE_PARTS)).ceil();
+        let parts = (margin / length * (1.0 - WHOLE_PARTS)).ceil();
         if parts <= EQUAL {
-            return start + room / parts;
+            return start + margin / parts;
         }
         let latest = start + length;
         let joints = self.problem.delays.iter().filter_map(|delay| {
@@ -473,12 +473,12 @@ impl<'a> Run<'a> {
             wanted
         };
         let ahead = self.breaks.next().map_or(f64::INFINITY, |point| point.time);
-        let room = (ahead - self.solution.end).min(self.longest());
+        let margin = (ahead - self.solution.end).min(self.longest());
         self.preferred = self.orders[usize::from(self.element.newton.is_uncoupled())];
         // Use fewer nodes where the next element is no longer than this one needed to be.
-        let parts = (room / wanted * (1.0 - WHOLE_PARTS)).ceil().max(1.0);
-        let is_equal = parts <= EQUAL && room / parts <= length * (1.0 + WHOLE_PARTS);
-        self.order = if (wanted > 1.5 * room.min(length) && wanted > room) || is_equal {
+        let parts = (margin / wanted * (1.0 - WHOLE_PARTS)).ceil().max(1.0);
+        let is_equal = parts <= EQUAL && margin / parts <= length * (1.0 + WHOLE_PARTS);
+        self.order = if (wanted > 1.5 * margin.min(length) && wanted > margin) || is_equal {
             control::next_order(verdict.terms, self.order, self.preferred)
         } else {
             self.preferred

@@ -6,7 +6,7 @@ use super::track;
 use super::track::{Piece, Track};
 use crate::Error;
 use crate::dde::limits::finite;
-use crate::memory::room;
+use crate::memory::require;
 
 /// The matrices by their delays, row-major, and their sizes.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -95,7 +95,7 @@ impl Signal {
         }
         finite("a signal", series)?;
         // A piece with its series; a run works on a copy.
-        room::<[f64; 48]>("the signal", edges.len())?;
+        require::<[f64; 48]>("the signal", edges.len())?;
         let piece = |(i, pair): (usize, &[f64])| {
             let own = &series[i * width * terms..(i + 1) * width * terms];
             let degree = own

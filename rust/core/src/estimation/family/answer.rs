@@ -40,7 +40,7 @@ pub struct Family {
     pub sensor: Vec<SensorFault>,
     /// The largest delay that may be, that was tried in the end, and one over the noise of each record.
     pub(super) largest_delay: f64,
-    pub(super) room: f64,
+    pub(super) delay_limit: f64,
     pub(super) weights: Vec<f64>,
     pub(super) minima: Vec<Candidate>,
 }

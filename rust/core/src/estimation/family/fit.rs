@@ -21,7 +21,7 @@ const FEWEST_ROWS: usize = 20;
 
 /// What the largest delay is above those of the first pass, as a factor and in rows: more leaves out more
 /// rows at the start, less may end at a delay that the noise of the first pass made too short.
-const ROOM: (f64, f64) = (1.25, 3.0);
+const DELAY_LIMIT: (f64, f64) = (1.25, 3.0);
 
 /// Numbers that one sine tells.
 const TOLD_BY_SINE: usize = 2;
@@ -165,9 +165,15 @@ pub fn refine_family(
     let longest = longest.fold(0.0, f64::max);
     let row = records.iter().map(Record::row).fold(0.0, f64::max);
     let largest = question.largest_delay.unwrap_or(known.largest_delay);
-    let room = largest.min(ROOM.0 * longest + ROOM.1 * row);
-    let mut rows = Rows::new(records, &starts, room, known.straight, question.in_loop);
-    check_rows(&rows, room)?;
+    let delay_limit = largest.min(DELAY_LIMIT.0 * longest + DELAY_LIMIT.1 * row);
+    let mut rows = Rows::new(
+        records,
+        &starts,
+        delay_limit,
+        known.straight,
+        question.in_loop,
+    );
+    check_rows(&rows, delay_limit)?;
     let mut rounds = 0;
     loop {
         let found = beside(&seeds, &rows, task)?;
@@ -183,7 +189,8 @@ pub fn refine_family(
             continue;
         }
         let mut out = answer(&found, f64::INFINITY, question, largest, task)?;
-        (out.room, out.weights, out.decided) = (room, rows.weights.clone(), known.decided);
+        (out.delay_limit, out.weights, out.decided) =
+            (delay_limit, rows.weights.clone(), known.decided);
         return Ok(out);
     }
 }
@@ -314,9 +321,9 @@ fn one_kind(
     let begun: Vec<Class> = Class::all().filter(leads).collect();
     let mut rows = Rows::new(records, starts, largest, straight, question.in_loop);
     check_rows(&rows, largest)?;
-    let (mut room, mut seeds, mut weights);
+    let (mut delay_limit, mut seeds, mut weights);
     if let Some(known) = known {
-        (room, seeds, weights) = (known.room, known.seeds(), known.weights.clone());
+        (delay_limit, seeds, weights) = (known.delay_limit, known.seeds(), known.weights.clone());
         classes.retain(|class| seeds.iter().any(|(own, _)| own == class));
     } else {
         let thin = rows.thinned(STARTS.thin);
@@ -330,15 +337,16 @@ fn one_kind(
             grids: true,
         };
         let found = minima(&white, task)?;
-        (room, seeds, weights) = (largest, seeds_of(&found), weights_of(&found));
+        (delay_limit, seeds, weights) = (largest, seeds_of(&found), weights_of(&found));
         if starts.contains(&Start::Unknown) && question.largest_delay.is_none() {
-            room = room.min(ROOM.0 * longest_delay(&found) + ROOM.1 * rows.row);
+            delay_limit =
+                delay_limit.min(DELAY_LIMIT.0 * longest_delay(&found) + DELAY_LIMIT.1 * rows.row);
         }
     }
     let mut rounds = 0;
     loop {
-        if room < rows.largest_delay {
-            rows = Rows::new(records, starts, room, straight, question.in_loop);
+        if delay_limit < rows.largest_delay {
+            rows = Rows::new(records, starts, delay_limit, straight, question.in_loop);
         }
         rows.weights.clone_from(&weights);
         // What rows leave open of a command imitates causes.
@@ -356,9 +364,9 @@ fn one_kind(
         };
         let found = minima(&plan, task)?;
         // Coloured noise may need a longer delay than the white noise of the first pass.
-        if room < largest && longest_delay(&found) >= room {
-            room = largest.min(2.0 * room);
-            rows = Rows::new(records, starts, room, straight, question.in_loop);
+        if delay_limit < largest && longest_delay(&found) >= delay_limit {
+            delay_limit = largest.min(2.0 * delay_limit);
+            rows = Rows::new(records, starts, delay_limit, straight, question.in_loop);
             continue;
         }
         let now = weights_of(&found);
@@ -373,7 +381,7 @@ fn one_kind(
         if rows.flexible {
             out = with_smoothing(out, &plan, &found, &answered, task)?;
         }
-        (out.room, out.weights) = (room, weights);
+        (out.delay_limit, out.weights) = (delay_limit, weights);
         return Ok(out);
     }
 }
@@ -485,7 +493,7 @@ fn answer(
         rivals: Vec::new(),
         sensor: Vec::new(),
         largest_delay,
-        room: largest_delay,
+        delay_limit: largest_delay,
         weights: Vec::new(),
         minima,
     })

@@ -219,9 +219,9 @@ pub(crate) fn right_edge(h: &QuasiPolynomial, height: f64) -> f64 {
         let summand = |k: usize, c: f64, gap: f64| {
             let (grown, decay) = (k as f64 * log(modulus), gap * x);
             // Each part is known to 1e-14 of 1 plus its size, even when the parts cancel.
-            let room = LOGARITHM_ROUNDING
+            let slack = LOGARITHM_ROUNDING
                 * (1.0 + k as f64 + own_degree + grown.abs() + powers.abs() + decay);
-            c.abs() * exp_above(grown - powers - decay + room)
+            c.abs() * exp_above(grown - powers - decay + slack)
         };
         let lower = first.iter().rev().skip(1).rev().enumerate();
         let mut sum: f64 = lower.map(|(k, c)| summand(k, *c, 0.0)).sum();

@@ -29,7 +29,7 @@ use crate::roots::region::Region;
 use crate::{Error, Task};
 
 /// Largest share of |v| that the error and the slope together may take. A larger share gives longer
-/// segments and leaves less room for the checker's rounding errors.
+/// segments and leaves less margin for the checker's rounding errors.
 const SHARE: f64 = 0.95;
 
 /// Covers the rounding of the sum that bounds the slope.
@@ -223,16 +223,16 @@ fn segment(
         .curvature_around(modulus(middle) + radius, radius);
     let flat = modulus(jet.slope) + jet.slope_error;
     let trifle = TRIFLE * modulus(jet.value) / radius;
-    let room = SHARE * modulus(jet.value) - jet.value_error;
+    let margin = SHARE * modulus(jet.value) - jet.value_error;
     let mut slope = (flat + bend * radius) * (1.0 + MARGIN) + trifle;
-    let mut reach = 2.0 * room / (flat + (flat * flat + 4.0 * bend * room).sqrt());
+    let mut reach = 2.0 * margin / (flat + (flat * flat + 4.0 * bend * margin).sqrt());
     let clear = is_clear(&jet);
-    if clear && slope * radius >= room && reach < CLUSTER_SUSPECTED * room / flat {
+    if clear && slope * radius >= margin && reach < CLUSTER_SUSPECTED * margin / flat {
         let taylor = TaylorBound::new(&walker.probe, middle);
         slope = taylor.slope(radius) + trifle;
         reach = reach.max(taylor.steady_reach(SHARE, radius));
     }
-    if clear && slope * radius < room {
+    if clear && slope * radius < margin {
         return Ok(Segment {
             start,
             end,

@@ -159,9 +159,9 @@ fn step(rows: &[Row], leader: usize, weights: &[f64], height: f64) -> f64 {
             a += size - row.rounding;
             b += row.lean() - row.slope_rounding;
             k += 0.5 * row.bend;
-            let room = SHARE * size - row.rounding;
+            let margin = SHARE * size - row.rounding;
             let slope = slope + row.slope_rounding;
-            half_plane = 2.0 * room / (slope + (slope * slope + 2.0 * row.bend * room).sqrt());
+            half_plane = 2.0 * margin / (slope + (slope * slope + 2.0 * row.bend * margin).sqrt());
         } else {
             a -= weight * (size + row.rounding);
             k += 0.5 * weight * row.bend;

@@ -78,14 +78,14 @@ pub(crate) fn survey_real(
         let trifle = TRIFLE * modulus(jet.value) / r;
         let flat = slope + jet.slope_error;
         let mut steepest = (flat + curved * bend * r) * ENLARGED + trifle;
-        let room = SHARE * modulus(jet.value) - jet.value_error;
+        let margin = SHARE * modulus(jet.value) - jet.value_error;
         // Where no parts have to be stated, the tests below end the survey with less work.
         let cluster_suspected =
             curved == 1.0 && bend * r > flat / CLUSTER_SUSPECTED && is_clear(&jet);
-        if cluster_suspected && steepest * r >= room {
+        if cluster_suspected && steepest * r >= margin {
             steepest = TaylorBound::new(&walker.probe, middle).slope(r) + trifle;
         }
-        if steepest * r < room {
+        if steepest * r < margin {
             visit(RealPart::Empty(Segment {
                 start: low.into(),
                 end: high.into(),

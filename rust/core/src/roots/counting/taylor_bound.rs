@@ -67,14 +67,14 @@ impl<'a> TaylorBound<'a> {
     /// The distance, at most `most`, within which g is proved to change by less than `share` of its
     /// value.
     pub(crate) fn reach(&self, share: f64, most: f64) -> f64 {
-        let room = share * self.value - self.error;
-        self.largest(room, most, |taylor, r| taylor.change(r))
+        let margin = share * self.value - self.error;
+        self.largest(margin, most, |taylor, r| taylor.change(r))
     }
 
     /// The same with the bound on |g′| times the distance in place of the change.
     pub(crate) fn steady_reach(&self, share: f64, most: f64) -> f64 {
-        let room = share * self.value - self.error;
-        self.largest(room, most, |taylor, r| taylor.slope(r) * r)
+        let margin = share * self.value - self.error;
+        self.largest(margin, most, |taylor, r| taylor.slope(r) * r)
     }
 
     fn change(&self, r: f64) -> f64 {
@@ -88,14 +88,14 @@ impl<'a> TaylorBound<'a> {
         remainder(self.h, self.reference, self.place, r, ORDER + 1)
     }
 
-    /// A radius for which `bound` is below `room`. The first radius tried is the one that the slope
+    /// A radius for which `bound` is below `margin`. The first radius tried is the one that the slope
     /// alone allows.
-    fn largest(&self, room: f64, most: f64, bound: impl Fn(&Self, f64) -> f64) -> f64 {
+    fn largest(&self, margin: f64, most: f64, bound: impl Fn(&Self, f64) -> f64) -> f64 {
         let slope = self.sizes.first().copied().unwrap_or(f64::INFINITY);
-        let first = (room / slope).min(most).max(0.0);
+        let first = (margin / slope).min(most).max(0.0);
         std::iter::successors(Some(first), |r| Some(SHRINKAGE * r))
             .take(MAX_ROUNDS)
-            .find(|r| bound(self, *r) < room)
+            .find(|r| bound(self, *r) < margin)
             .map_or(0.0, |r| r * (1.0 - MARGIN))
     }
 }

@@ -11,7 +11,7 @@
 //! directions have errors of u each, their product √5 u, `angle` 8 u (together below 13 u), τ_c Δy
 //! the relative error 3 u, the sum u. Terms that stay small along the step need no Taylor formula:
 //! they change g by at most their moduli at both points, and the formula is applied to the other
-//! terms. SHARE and the factors next to 1 leave far more room than the rounding errors of the test
+//! terms. SHARE and the factors next to 1 leave far more margin than the rounding errors of the test
 //! itself need: these are 20 u at most, and e is 2 per cent larger than necessary.
 //!
 //! Where |v| < 4e in double precision, the point is evaluated in double-double arithmetic. Where
@@ -235,14 +235,14 @@ impl<'a> Walker<'a> {
     fn reach(&self, jet: &Jet, s: Complex64, along: Complex64, most: f64) -> f64 {
         // Relative to the value, so that no square leaves the range.
         let unit = modulus(jet.value);
-        let room = SHARE - jet.value_error / unit;
+        let margin = SHARE - jet.value_error / unit;
         let slope = ((modulus(jet.slope) + jet.slope_error) / unit).max(LEAST_SLOPE);
         let size = modulus(s);
-        let mut span = most.min(room / slope);
+        let mut span = most.min(margin / slope);
         let mut best = 0.0f64;
         for _ in 0..MAX_REACH_ROUNDS {
             let bend = self.probe.curvature(size + span, along.re * span) / unit;
-            let r = within(room, slope, bend);
+            let r = within(margin, slope, bend);
             // Where the bound overflows nothing is known: `min` would return the span.
             if !r.is_nan() {
                 best = best.max(r.min(span) * ROUNDED_DOWN);
@@ -254,7 +254,7 @@ impl<'a> Walker<'a> {
             span = (GROWN * best).max(LEAST_SHRINKAGE * span);
         }
         // Not where the slope alone limits the step.
-        let farthest = room / slope;
+        let farthest = margin / slope;
         let cluster_suspected = if self.double_double_at == Some(s) {
             best < 0.5 * most.min(farthest)
         } else {
@@ -288,9 +288,9 @@ impl<'a> Walker<'a> {
             else {
                 return 0.0;
             };
-            let room = SHARE - (jet.value_error + dominated.perturbation) / unit;
+            let margin = SHARE - (jet.value_error + dominated.perturbation) / unit;
             let slope = ((modulus(dominated.slope) + jet.slope_error) / unit).max(LEAST_SLOPE);
-            let r = within(room, slope, dominated.bend / unit);
+            let r = within(margin, slope, dominated.bend / unit);
             if r >= 0.25 * span {
                 return r.min(span) * ROUNDED_DOWN;
             }
@@ -409,11 +409,11 @@ impl<'a> Walker<'a> {
     }
 }
 
-/// The largest r with `slope` r + `bend` r²/2 at most `room`.
-fn within(room: f64, slope: f64, bend: f64) -> f64 {
+/// The largest r with `slope` r + `bend` r²/2 at most `margin`.
+fn within(margin: f64, slope: f64, bend: f64) -> f64 {
     // Relative to the slope, whose square may leave the range.
-    let bent = 2.0 * (bend / slope) * (room / slope);
-    2.0 * (room / slope) / (1.0 + (1.0 + bent).sqrt())
+    let bent = 2.0 * (bend / slope) * (margin / slope);
+    2.0 * (margin / slope) / (1.0 + (1.0 + bent).sqrt())
 }
 
 impl Walk for Walker<'_> {

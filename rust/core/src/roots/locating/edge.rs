@@ -173,12 +173,12 @@ fn side(set: &RootSet, i: usize, region: &Region) -> Side {
         (center.im - im.0, im.1 - center.im)
     };
     // The rounding error of a difference that decides is less than u times the larger number.
-    let room = radius + f64::EPSILON * modulus(*center);
-    let room = if *radius == 0.0 { 0.0 } else { room };
+    let slack = radius + f64::EPSILON * modulus(*center);
+    let slack = if *radius == 0.0 { 0.0 } else { slack };
     let gaps = [center.re - re.0, re.1 - center.re, low, high];
-    if gaps.iter().any(|gap| *gap < -room) {
+    if gaps.iter().any(|gap| *gap < -slack) {
         Side::Outside
-    } else if gaps.iter().any(|gap| *gap <= room) {
+    } else if gaps.iter().any(|gap| *gap <= slack) {
         Side::OnEdge
     } else {
         Side::Inside

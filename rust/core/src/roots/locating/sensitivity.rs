@@ -118,8 +118,8 @@ mod tests {
         let (down, _) = sensitivity(&at(2.0 - step), near, &[], &task)?;
         let (_, slopes) = sensitivity(&at(2.0), near, &[(0.36, 0)], &task)?;
         let wanted = (up - down) / (2.0 * step);
-        let room = 1e-7 * wanted.norm();
-        assert!(slopes.iter().all(|s| (s - wanted).norm() < room));
+        let margin = 1e-7 * wanted.norm();
+        assert!(slopes.iter().all(|s| (s - wanted).norm() < margin));
         Ok(())
     }
 

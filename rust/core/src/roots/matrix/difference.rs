@@ -274,13 +274,13 @@ impl Difference {
     /// The abscissa at which norms alone show that the chains end: Σ ‖C_j‖ e^(−σ τ_j) = 1 −
     /// (errors).
     fn norm_bound(&self) -> f64 {
-        let room = 1.0 - self.loss;
+        let margin = 1.0 - self.loss;
         let count = self.terms.len() as f64;
         let parts: Vec<(f64, f64)> = self
             .terms
             .iter()
             .zip(&self.losses)
-            .map(|((delay, _, norm), loss)| (log((norm + loss) * count / room * MARGIN), *delay))
+            .map(|((delay, _, norm), loss)| (log((norm + loss) * count / margin * MARGIN), *delay))
             .collect();
         let bound = |extra: f64| {
             parts

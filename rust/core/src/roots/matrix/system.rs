@@ -11,7 +11,7 @@ use crate::linear_algebra::balance::balanced_above;
 /// Largest exponent of the scaling, so that nothing underflows or overflows.
 const MOST_EXPONENT: i32 = 200;
 
-/// Sizes of entries that leave room for products in double precision.
+/// Sizes of entries whose products are numbers in double precision.
 const USABLE: std::ops::Range<f64> = 1e-100..1e100;
 
 /// The contribution of one delay to one row of M: `(s · slope + value) e^(−s τ)` in each column.

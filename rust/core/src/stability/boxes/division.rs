@@ -199,13 +199,13 @@ impl<'a, const D: usize> Tree<'a, D> {
         }]);
         while tree.boxes.undecided > limits.undecided && !waiting.is_empty() {
             // Judging a box adds at most one box.
-            let room = limits
+            let margin = limits
                 .boxes
                 .saturating_sub(tree.boxes.unstable.len() + waiting.len());
-            if room == 0 {
+            if margin == 0 {
                 break;
             }
-            let size = GROUP.min(waiting.len()).min(room);
+            let size = GROUP.min(waiting.len()).min(margin);
             let group: Vec<Waiting<D>> = waiting.drain(..size).collect();
             let verdicts = tree.judge(&group, task)?;
             for (judged, verdict) in group.into_iter().zip(verdicts) {

@@ -114,18 +114,18 @@ pub fn stability_radius(
         ends.map(|(index, (value, scale))| {
             // Rounded outwards by the errors of the products and sums.
             let reach = radius * scale * (1.0 + 4.0 * f64::EPSILON);
-            let room = if *scale == 0.0 {
+            let margin = if *scale == 0.0 {
                 0.0
             } else {
                 f64::EPSILON * value.abs()
             };
-            let low = value - reach - room;
+            let low = value - reach - margin;
             let low = if floored(index) {
                 low.max(0.0).min(*value)
             } else {
                 low
             };
-            (low, value + reach + room)
+            (low, value + reach + margin)
         })
         .collect()
     };

@@ -84,7 +84,7 @@ impl Stretch {
         let t = from + 0.5 * (to - from);
         let rho = (t - from).max(to - t) * (1.0 + 2.0 * f64::EPSILON);
         let middle = piece.from + piece.along * t;
-        let (lean, room) = (
+        let (lean, margin) = (
             piece.along.re.abs() * rho,
             8.0 * f64::EPSILON * middle.re.abs(),
         );
@@ -97,7 +97,7 @@ impl Stretch {
             } else {
                 (modulus(middle) + rho) * (1.0 + 8.0 * f64::EPSILON)
             },
-            reals: (middle.re - lean - room, middle.re + lean + room),
+            reals: (middle.re - lean - margin, middle.re + lean + margin),
         }
     }
 

@@ -211,15 +211,15 @@ impl<'a> Search<'a> {
     fn start(&mut self) -> Option<Point> {
         let zero = self.pencil.at(0.0);
         let slope = zero.f[1];
-        let room = slope.abs() - self.bounds.error[1];
-        if room > 0.0 {
+        let margin = slope.abs() - self.bounds.error[1];
+        if margin > 0.0 {
             self.record(&zero, 0.0, Some(if slope > 0.0 { -1 } else { 1 }))?;
             // With bounds of a usual step, then with those of the length that they prove.
             for is_second in [false, true] {
                 // F(0) = 0, and up to here F′ keeps its sign.
-                let room = slope.abs() - self.bounds.error[1];
+                let margin = slope.abs() - self.bounds.error[1];
                 let bend = zero.f[2].abs() + self.bounds.error[2];
-                let length = quadratic(room, -bend, -0.5 * self.bounds.third) * SHARE;
+                let length = quadratic(margin, -bend, -0.5 * self.bounds.third) * SHARE;
                 let limit = self.top.min(self.bounds.reach);
                 for share in STARTS {
                     let next = self.pencil.at((share * length).min(limit));

@@ -36,7 +36,7 @@ pub(crate) fn grid<'a>(map: &Map<'a>) -> Option<Grid<'a, 2>> {
     })
 }
 
-/// A page maps no family that needs blocks, and has no room for them.
+/// A page maps no family that needs blocks, and does without them to stay small.
 const IS_PAGE: bool = cfg!(target_family = "wasm");
 
 /// The index of the axis along the rows, and the crossings of each.

@@ -53,8 +53,8 @@ pub fn map(
         return Ok(Chart::default());
     }
     // The memory is reserved before the work: a count and a status for each cell, and an abscissa.
-    memory::room::<[u8; 5]>("the map", cells)?;
-    memory::room::<f64>("the map", if question.abscissa { cells } else { 0 })?;
+    memory::require::<[u8; 5]>("the map", cells)?;
+    memory::require::<f64>("the map", if question.abscissa { cells } else { 0 })?;
     if question.proof == Proof::Cells {
         return map.cell_by_cell();
     }

@@ -53,7 +53,7 @@ pub(super) fn run<S: Scalar>(
     requested: &mut RequestedOutput<'_, S>,
     task: &Task,
 ) -> Result<bool, Error> {
-    // A page has no room for a second method; the general one gives the same to rounding.
+    // A page has one method only, to keep it small; the general one gives the same to rounding.
     let is_page = cfg!(target_family = "wasm");
     if is_page || S::MOVES || requested.is_measured() || plant.bounds().is_some() {
         return Ok(false);

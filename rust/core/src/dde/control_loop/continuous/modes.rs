@@ -5,16 +5,10 @@
 //! In all other loops the state moves otherwise while the command is at a bound, or there is no delay.
 //!
 //! In each mode of the command the loop is linear ([`field`](super::field)), and an element ends where a
-//! signal leaves the mode: the command reaches or leaves a bound, its rate reaches the bound on that, a
-//! limited rate has caught up, an integral stops or runs again. Such signals are polynomials, whose zeros
-//! are isolated; a zero counts only if the signal then leaves the mode by more than the rounding errors
-//! of its parts, because these could otherwise change the mode without end. Without a delay and for
-//! L < 1, or any L ≠ 1 without bounds, w = v has one solution.
-//!
-//! An integral that stops makes the right-hand side jump at a bound. Where it would drive the command out
-//! while it runs and lets it back in while it stops, the command stays at the bound: the integral then
-//! follows from that (Filippov 1960). Which mode follows depends on all that moves in the element before
-//! it: elements, modes and their changes are one state machine, and one file.
+//! signal leaves the mode ([`transitions`]). Without a delay and for L < 1, or any L ≠ 1 without bounds,
+//! w = v has one solution.
+
+mod transitions;
 
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start, saturate};
 use crate::dde::control_loop::reference::{Cursor, Reference};
@@ -25,25 +19,14 @@ use crate::{Error, Task};
 
 use super::effort::watch;
 use super::expansion::Expansion;
-use super::field::{Field, Integral, Mode, Signal};
+use super::field::{Field, Mode};
 use super::impulses::Impulses;
 use super::pieces::{Order, Orders, Pieces, REPORTED, SMOOTH};
 use super::saturation::{Side, Stretch, side_of, stretches};
-use crate::dde::control_loop::level_crossings::{in_order, value_at};
 use crate::dde::control_loop::series::Series;
-
-/// Changes of mode without progress in time after which the mode is kept, because only rounding
-/// errors at a bound cause them.
-const MOST_CHANGES: u32 = 4;
 
 /// Factor on the length of a shortened element.
 const MARGIN: f64 = 0.95;
-
-/// Rounding error of a signal, relative to the sum of its parts.
-const NOISE: f64 = 16.0 * f64::EPSILON;
-
-/// Parts of an interval at which a signal is looked at.
-const PROBES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 
 pub(super) fn run<S: Scalar>(
     plant: &LinearLoop<S>,
@@ -122,13 +105,6 @@ fn check<S: Scalar>(plant: &LinearLoop<S>) -> Result<(), Error> {
          back-calculation or a sample_time"
     );
     Ok(())
-}
-
-/// A mode that follows, and where on the element.
-#[derive(Clone, Copy)]
-struct Change {
-    at: f64,
-    mode: Mode,
 }
 
 struct Run<'a, 'r, S: Scalar> {
@@ -310,51 +286,6 @@ impl<S: Scalar> Run<'_, '_, S> {
         piece.series.at((self.t - piece.origin) / piece.scale)
     }
 
-    /// Find the mode after a jump.
-    fn settle(&mut self, w: S) {
-        let mut slew = 0;
-        self.enter(Mode {
-            slew: i8::from(self.plant.rate().is_some()),
-            ..Mode::FREE
-        });
-        let u = self.field().u.at(&self.z, w, self.r).value();
-        let side = side_of(u, self.bounds());
-        if self.plant.rate().is_some() {
-            let aim = match (side, self.plant.bounds()) {
-                (1, Some((_, high))) => high.value(),
-                (-1, Some((low, _))) => low.value(),
-                _ => u,
-            };
-            let v = self.z.last().map_or(0.0, |v| v.value());
-            let noise = NOISE * (aim.abs() + v.abs());
-            slew = i8::from(aim > v + noise) - i8::from(aim < v - noise);
-        }
-        let integral = self.integral(side, slew, w);
-        self.enter(Mode {
-            side,
-            integral,
-            slew,
-        });
-    }
-
-    /// Whether the integral stops beyond a bound.
-    fn integral(&mut self, side: Side, slew: Side, w: S) -> Integral {
-        if side == 0 || self.plant.stops().is_none() {
-            return Integral::Runs;
-        }
-        self.enter(Mode {
-            side,
-            integral: Integral::Runs,
-            slew,
-        });
-        let drive = self.field().drive.at(&self.z, w, self.r).value();
-        if drive * f64::from(side) > 0.0 {
-            Integral::Stops
-        } else {
-            Integral::Runs
-        }
-    }
-
     /// Expand the states over an element; returns the part on which the series holds.
     fn expand(&mut self, h: S) -> f64 {
         let (field, expansion) = &mut self.fields[self.place];
@@ -362,182 +293,6 @@ impl<S: Scalar> Run<'_, '_, S> {
         let forced = field.slopes.iter().map(|s| s.forced(self.r));
         self.forced.extend(forced);
         MARGIN * expansion.expand(&field.a, &field.b, &self.forced, &self.z, &self.w, h)
-    }
-
-    /// A signal on the element.
-    fn series(&self, signal: &Signal<S>) -> Series<S> {
-        let mut out = Series::constant(S::default());
-        let expansion = &self.fields[self.place].1;
-        signal.on(expansion, &self.w, self.r, &mut out);
-        out.trim();
-        out
-    }
-
-    /// Rounding errors of a signal on the element.
-    fn noise(&self, signal: &Signal<S>) -> f64 {
-        let expansion = &self.fields[self.place].1;
-        let w: f64 = self.w.terms().iter().map(|c| c.value().abs()).sum();
-        let forced = signal.constant.value().abs() + (signal.r.value() * self.r).abs();
-        NOISE * (expansion.size(&signal.states) + signal.w.value().abs() * w + forced)
-    }
-
-    /// The first change of mode on the element.
-    fn change(&self, h: S) -> Option<Change> {
-        if self.is_cut || (self.plant.bounds().is_none() && self.plant.rate().is_none()) {
-            return None;
-        }
-        let mode = self.field().mode;
-        let mut first: Option<Change> = None;
-        let mut note = |series: &Series<S>, noise: f64, to: Mode| {
-            if let Some(at) = self.left(series, noise)
-                && first.is_none_or(|known| at < known.at)
-            {
-                first = Some(Change { at, mode: to });
-            }
-        };
-        let field = self.field();
-        let u = self.series(&field.u);
-        let (least, most) = u.range();
-        let bounds = self.plant.bounds();
-        let is_inside =
-            bounds.is_none_or(|(low, high)| least >= low.value() && most <= high.value());
-        if is_inside && mode == Mode::FREE && self.plant.rate().is_none() {
-            return None;
-        }
-        let noise = self.noise(&field.u);
-        if let Some((low, high)) = bounds {
-            for (side, bound) in [(1, high), (-1, low)] {
-                if !bound.value().is_finite() || mode.integral == Integral::Slides {
-                    continue;
-                }
-                // Within: the bound less u; beyond: u less the bound.
-                let sign = if mode.side == side { 1.0 } else { -1.0 };
-                if mode.side == side || mode.side == 0 {
-                    let room = against(&u, bound, sign * f64::from(side));
-                    let next = Mode {
-                        side: if mode.side == 0 { side } else { 0 },
-                        integral: Integral::Runs,
-                        ..mode
-                    };
-                    note(&room, noise + NOISE * bound.value().abs(), next);
-                }
-            }
-        }
-        if mode.side != 0 && self.plant.stops().is_some() {
-            self.integrals(f64::from(mode.side), &mut note);
-        }
-        if let Some(rate) = self.plant.rate() {
-            if mode.slew != 0 {
-                let aim = self.aim();
-                let mut left = self.series(&aim);
-                let v = self.series(&field.v);
-                add(&mut left, -1.0, &v);
-                let noise = self.noise(&aim) + self.noise(&field.v);
-                let next = Mode { slew: 0, ..mode };
-                note(&scaled(&left, f64::from(mode.slew)), noise, next);
-            } else if mode.side == 0 {
-                let slope = scaled(&u.derivative(), 1.0 / h.value());
-                let noise = noise * slope.degree.max(1) as f64 / h.value();
-                for slew in [1, -1] {
-                    let room = against(&slope, S::from(f64::from(slew)) * rate, -f64::from(slew));
-                    note(&room, noise + NOISE * rate.value(), Mode { slew, ..mode });
-                }
-            }
-        }
-        first
-    }
-
-    /// Changes of the integral beyond a bound.
-    fn integrals(&self, side: f64, note: &mut impl FnMut(&Series<S>, f64, Mode)) {
-        let field = self.field();
-        let mode = field.mode;
-        let to = |integral| Mode { integral, ..mode };
-        let mut out = field.drift.clone();
-        match mode.integral {
-            Integral::Runs => {
-                let drive = scaled(&self.series(&field.drive), -side);
-                note(&drive, self.noise(&field.drive), to(Integral::Stops));
-            }
-            Integral::Stops => {
-                let drive = scaled(&self.series(&field.drive), side);
-                note(&drive, self.noise(&field.drive), to(Integral::Runs));
-            }
-            Integral::Slides => {
-                let drift = scaled(&self.series(&out), -side);
-                note(&drift, self.noise(&out), to(Integral::Stops));
-                out.add(S::from(1.0), &field.drive);
-                let free = Mode {
-                    side: 0,
-                    integral: Integral::Runs,
-                    ..mode
-                };
-                note(&scaled(&self.series(&out), side), self.noise(&out), free);
-            }
-        }
-    }
-
-    /// What the command would be without a bound on its rate.
-    fn aim(&self) -> Signal<S> {
-        let field = self.field();
-        match (field.mode.side, self.plant.bounds()) {
-            (1, Some((_, high))) => Signal::constant(self.z.len(), high),
-            (-1, Some((low, _))) => Signal::constant(self.z.len(), low),
-            _ => field.u.clone(),
-        }
-    }
-
-    /// Where a signal becomes clearly negative.
-    fn left(&self, series: &Series<S>, noise: f64) -> Option<f64> {
-        let (least, _) = series.range();
-        if least >= -noise {
-            return None;
-        }
-        let mut zeros = in_order(series, [0.0], vec![0.0]);
-        zeros.push(1.0);
-        zeros.windows(2).find_map(|pair| {
-            let (from, to) = (pair[0], pair[1]);
-            let at = |part: f64| value_at(series, from + part * (to - from));
-            let is_left = PROBES.into_iter().any(|part| at(part) < -noise);
-            (is_left && (from > 0.0 || self.changes < MOST_CHANGES)).then_some(from)
-        })
-    }
-
-    /// Go to another mode, at the end of the element.
-    fn leave(&mut self, change: Change) {
-        let w = self.w.at(S::from(change.at));
-        let mut mode = change.mode;
-        let last = self.field().mode;
-        if self.plant.stops().is_some() && mode.side != last.side {
-            mode = self.across(last, mode, w);
-        }
-        self.enter(mode);
-    }
-
-    /// The mode at a bound that the command reaches or leaves, of an integral that may stop.
-    fn across(&mut self, last: Mode, mode: Mode, w: S) -> Mode {
-        let side = if mode.side == 0 { last.side } else { mode.side };
-        let beyond = Mode {
-            side,
-            integral: Integral::Runs,
-            ..mode
-        };
-        self.enter(beyond);
-        let field = self.field();
-        let sign = f64::from(side);
-        let drive = sign * field.drive.at(&self.z, w, self.r).value();
-        let drift = sign * field.drift.at(&self.z, w, self.r).value();
-        let to = |integral| Mode { integral, ..beyond };
-        if last.integral == Integral::Slides {
-            mode
-        } else if drive <= 0.0 {
-            if mode.side == 0 { mode } else { beyond }
-        } else if drift > 0.0 {
-            to(Integral::Stops)
-        } else if drift + drive > 0.0 {
-            to(Integral::Slides)
-        } else {
-            Mode { side: 0, ..mode }
-        }
     }
 
     /// The values of the bounds.
@@ -622,26 +377,5 @@ impl<S: Scalar> Run<'_, '_, S> {
             *place = v.at(S::from(end));
         }
         check_growth(&self.z, v.coefficients[0], next)
-    }
-}
-
-/// `sign` (u − bound).
-fn against<S: Scalar>(u: &Series<S>, bound: S, sign: f64) -> Series<S> {
-    let mut out = *u;
-    out.coefficients[0] = out.coefficients[0] - bound;
-    scaled(&out, sign)
-}
-
-fn scaled<S: Scalar>(u: &Series<S>, gain: f64) -> Series<S> {
-    let mut out = *u;
-    let terms = out.coefficients.iter_mut().take(out.degree + 1);
-    terms.for_each(|c| *c *= S::from(gain));
-    out
-}
-
-fn add<S: Scalar>(sum: &mut Series<S>, gain: f64, other: &Series<S>) {
-    sum.degree = sum.degree.max(other.degree);
-    for (c, o) in sum.coefficients.iter_mut().zip(&other.coefficients) {
-        *c += S::from(gain) * *o;
     }
 }

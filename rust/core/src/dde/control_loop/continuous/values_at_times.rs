@@ -12,7 +12,7 @@ type Block = [f64; LANES];
 #[derive(Debug)]
 pub(super) struct ValuesAtTimes<'t> {
     times: &'t [f64],
-    /// With room for a whole block behind the last time.
+    /// With memory for a whole block behind the last time.
     found: Vec<f64>,
     done: usize,
 }

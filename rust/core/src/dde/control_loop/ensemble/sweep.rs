@@ -8,7 +8,7 @@ use super::sets::{Measures, Outcome, SETS, Sets, of};
 use super::shape::sorted;
 use super::through::{Job, through};
 use crate::dde::control_loop::metrics::Criteria;
-use crate::memory::{filled, push, reserved, room};
+use crate::memory::{filled, push, require, reserved};
 use crate::parallel;
 use crate::{Error, Task};
 
@@ -55,7 +55,7 @@ impl Sets<'_> {
             let work = |_, (blocks, found): (&[Members<'_>], &mut Vec<J::Found>)| {
                 task.check()?;
                 let columns = blocks.iter().map(|(shape, _)| shape.columns()).max();
-                room::<Column>(SWEEP, columns.unwrap_or(0))?;
+                require::<Column>(SWEEP, columns.unwrap_or(0))?;
                 through(self, blocks, (span, job), found);
                 let done = found.iter().flat_map(J::done).filter(|is_done| *is_done);
                 task.advance(done.count() as u64);

@@ -3,7 +3,7 @@
 use crate::dde::control_loop::linear_loop::{Bounds, dot, saturate};
 use crate::dde::control_loop::reference::Reference;
 use crate::dde::limits::{RESPONSE, check_growth};
-use crate::memory::{reserved, room};
+use crate::memory::{require, reserved};
 use crate::{Error, Task};
 
 use super::buffer::{Buffer, SLACK};
@@ -106,7 +106,7 @@ pub fn run(
 ) -> Result<(Vec<f64>, Vec<f64>), Error> {
     check(blocks, settings, rest)?;
     let lag = settings.delay / settings.step;
-    room::<[f64; 2]>(
+    require::<[f64; 2]>(
         "the buffer of the delay",
         (lag as usize).min(settings.steps),
     )?;

@@ -342,8 +342,8 @@ fn matters(without: &Family, with: &Family, task: &Task) -> Result<bool, Error> 
     Ok(moves.any(|share| share.is_nan() || share > CAUSES.matters))
 }
 
-/// Is the last of these causes there: of a size that is not zero, better than the same plant under the same
-/// noise without it, and no beginning of many?
+/// Is the last of these causes there: of a size that is not zero, beside others of possible sizes, better than the
+/// same plant under the same noise without it, and no beginning of many?
 fn is_there(
     causes: &[Cause],
     fit: &[Minimum<'_>],
@@ -362,7 +362,8 @@ fn is_there(
     } else {
         cause.size.abs()
     };
-    if size.is_nan() || size < CAUSES.sure * cause.error {
+    let is_impossible = |one: &Cause| one.kind.is_positive() && one.size <= 0.0;
+    if size.is_nan() || size < CAUSES.sure * cause.error || causes.iter().any(is_impossible) {
         return Ok(false);
     }
     let model = Model {
