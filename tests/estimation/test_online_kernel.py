@@ -14,8 +14,8 @@ from deadtime._deadtime import (
     PlantNumbers,
     RowNoise,
 )
-from deadtime.estimation.likelihood._disturbances import Disturbance
-from deadtime.estimation.running._settings import BankSettings
+from deadtime.estimation.likelihood._plant import Disturbance
+from deadtime.estimation.running._bank import BankSettings
 
 WHITE, AIR, AIR_TIME, SENSOR, SENSOR_TIME = 0.006, 0.08, 0.9, 0.004, 0.2
 DELAYS = [0.27, 0.285, 0.3, 0.312, 0.33]

@@ -9,9 +9,9 @@ while the loop runs. Each method is a class that holds its options.
 # The files. `_estimate` chooses and runs a method, `_compare` runs several, `_choose` tries several
 # plants, `_result` is what they return, `_shared` combines several. `evidence` finds the plant of a
 # recording without a loop. `methods` holds one file a method, `data` what they read from a
-# recording, `fit` least squares, profiles and residuals, `likelihood` plant and noise as the kernel
-# takes them, `planning` the bounds of planned experiments, `running` what is estimated while a loop
-# runs.
+# recording, `_least_squares` models, profiles and residuals, `likelihood` plant and noise as the
+# kernel takes them, `planning` the bounds of planned experiments, `running` what is estimated while
+# a loop runs.
 
 from deadtime.estimation._choose import (
     PLANT_COLUMNS as PLANT_COLUMNS,
@@ -32,6 +32,7 @@ from deadtime.estimation._estimate import (
     automatic_method as automatic_method,
     estimate_delay,
 )
+from deadtime.estimation._least_squares import Whiteness
 from deadtime.estimation._plots import (
     estimate_axes as estimate_axes,
     plot_estimate as plot_estimate,
@@ -46,7 +47,6 @@ from deadtime.estimation.evidence._find import refit as refit
 from deadtime.estimation.evidence._numbers import FittedRecording, LoopView
 from deadtime.estimation.evidence._question import PLANTS as PLANTS
 from deadtime.estimation.evidence._words import Advice
-from deadtime.estimation.fit._residuals import Whiteness
 from deadtime.estimation.likelihood._judgement import unseen_in_words as unseen_in_words
 from deadtime.estimation.methods._arx_scan import ARXScan
 from deadtime.estimation.methods._cta import CTA
@@ -70,7 +70,7 @@ from deadtime.estimation.methods._waveform import NoisePath as NoisePath, Wavefo
 from deadtime.estimation.planning._identifiability import Identifiability, identifiability
 from deadtime.estimation.planning._monte_carlo import MonteCarlo
 from deadtime.estimation.planning._planned_bound import PlannedBound
-from deadtime.estimation.running._estimate import OnlineEstimate
+from deadtime.estimation.running._bank import OnlineEstimate
 from deadtime.estimation.running._estimator import OnlineEstimator
 from deadtime.estimation.running._track import DelayTrack, online
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError, RecordingError
 from deadtime._base.validation import OpenRange
-from deadtime.estimation._estimate import METHODS, checked_run
-from deadtime.estimation._findings import bound
+from deadtime.estimation._estimate import METHODS, bound, checked_run
 from deadtime.estimation._native import independent_samples
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.evidence._rival import beside_rivals

@@ -18,9 +18,8 @@ from deadtime._base.notebook import Pictured
 from deadtime._base.validation import confidence, non_negative, real_array
 from deadtime._base.verdicts import NOT_CLAIMED, Verdict, claimed, rough
 from deadtime.estimation._felt import FELT, WORDS, Felt, highest_excited
+from deadtime.estimation._least_squares import Profile, Whiteness, floor_of, unit_of
 from deadtime.estimation._native import FlightProfile
-from deadtime.estimation.fit._profile import Profile, floor_of, unit_of
-from deadtime.estimation.fit._residuals import Whiteness
 from deadtime.experiments import FlightNoise
 from deadtime.loops import (
     Controller,

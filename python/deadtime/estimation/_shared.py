@@ -21,8 +21,8 @@ from deadtime._base.digits import between, shown
 from deadtime._base.plain import plain_fields
 from deadtime._base.validation import confidence
 from deadtime._base.verdicts import Verdict, claimed, verdict_if
+from deadtime.estimation._least_squares import floor_of, unit_of
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.fit._profile import floor_of, unit_of
 
 #: Steps of the grid in the smallest interval, and most of them.
 IN_AN_INTERVAL, ON_THE_GRID = 8, 120

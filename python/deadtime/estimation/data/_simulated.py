@@ -1,6 +1,7 @@
 """Commands of a recording, and simulations of the recorded loop over a window of it.
 
-The command of every row is the logged one, or computed from the controller.
+The command of every row is the logged one, or computed from the controller. One that was logged one
+row late or early is put on its row.
 
 `SimulatedRecording` alone turns a window of a recording into initial conditions: the loop starts
 at rest at its output at the beginning of the window, the simulation is evaluated at the time stamps
@@ -21,7 +22,7 @@ from deadtime._base.errors import NotIdentifiableError, RecordingError
 from deadtime.estimation._native import LoopMisfit
 from deadtime.estimation.data._checks import start_and_span
 from deadtime.loops import ControlLoop, P
-from deadtime.recordings import Recording
+from deadtime.recordings import Columns, Recording, RecordingCheck
 
 #: A logged command is taken to be the P controller's where the two differ by less than this share
 #: of the command's standard deviation. Larger values accept more noise in the log, and more foreign
@@ -224,3 +225,30 @@ def _past_commands(recording: Recording, loop: ControlLoop, start: int) -> Array
     if not isinstance(loop.controller, P):
         return np.empty(0)
     return known_commands(recording, loop)[0][:start]
+
+
+#: Rows further apart than so many times the usual are not neighbours.
+NEIGHBOURS = 1.5
+
+#: By how many rows a command is taken later, by what a check finds.
+WAYS = {"command_late": 1, "command_early": -1}
+
+
+def rows_off(check: RecordingCheck) -> int:
+    """By how many rows a command was logged late, as the law of its controller shows."""
+    return next((WAYS[finding.code] for finding in check.findings if finding.code in WAYS), 0)
+
+
+def on_its_row(recording: Recording, loop: ControlLoop, check: RecordingCheck) -> Recording:
+    """The recording with each command on its row; by the law where there is none."""
+    rows = rows_off(check)
+    assert recording.command is not None
+    time, command = recording.time, recording.command
+    largest = loop.limit or check.limit_seen or float(np.max(np.abs(command)))
+    columns = Columns(time, recording.reference, recording.output, None)
+    law = columns.commands(loop.replace(limit=largest))
+    assert law is not None
+    wanted = np.arange(time.size) + rows
+    places = np.clip(wanted, 0, time.size - 1)
+    known = (places == wanted) & (np.abs(time[places] - time) < NEIGHBOURS * check.row_time)
+    return replace(recording, command=np.where(known, command[places], law))

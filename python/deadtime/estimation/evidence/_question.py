@@ -16,7 +16,7 @@ from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import OpenRange, open_interval, positive
 from deadtime.estimation.data._given import given_recordings, one_each
-from deadtime.estimation.data._on_its_row import on_its_row, rows_off
+from deadtime.estimation.data._simulated import on_its_row, rows_off
 from deadtime.loops import Controller, ControlLoop, Integrator, P
 from deadtime.recordings import Columns, Recording
 

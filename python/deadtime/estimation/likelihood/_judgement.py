@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from deadtime._base.digits import stated
+from deadtime.estimation._least_squares import Whiteness
 from deadtime.estimation._native import FlightFinding, FlightProfile
-from deadtime.estimation.fit._residuals import Whiteness
 
 #: What speaks against a fit, by the kernel's name of it, with its sizes.
 WORDS = {

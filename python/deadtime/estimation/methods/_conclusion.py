@@ -22,6 +22,16 @@ import numpy as np
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.verdicts import Verdict, verdict_if
+from deadtime.estimation._least_squares import (
+    Minimum,
+    Model,
+    Profile,
+    Whiteness,
+    least_cost,
+    pieces_of,
+    whiteness_of,
+    without_vanishing as without_vanishing,
+)
 from deadtime.estimation._result import ADVICE, REASONS, CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import (
     ROUNDING,
@@ -30,13 +40,6 @@ from deadtime.estimation.data._checks import (
     standard_errors,
 )
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.fit._least_squares import (
-    Minimum,
-    Model,
-    without_vanishing as without_vanishing,
-)
-from deadtime.estimation.fit._profile import Profile, least_cost
-from deadtime.estimation.fit._residuals import Whiteness, pieces_of, whiteness_of
 from deadtime.estimation.methods._method import Method, Run
 from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop

@@ -25,6 +25,7 @@ import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
+from deadtime.estimation._least_squares import Ends, ModelOfOne, place_of
 from deadtime.estimation._native import ChebyshevMisfit
 from deadtime.estimation.data._checks import (
     check_excitation,
@@ -35,7 +36,6 @@ from deadtime.estimation.data._checks import (
 )
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import stiffness_of
-from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, place_of
 from deadtime.estimation.methods._conclusion import OfOne, Read, spreads_of
 from deadtime.estimation.methods._method import Run, check_initial_output
 from deadtime.loops import ControlLoop

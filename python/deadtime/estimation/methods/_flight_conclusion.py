@@ -13,10 +13,9 @@ import numpy as np
 import deadtime.estimation._native as native
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.verdicts import verdict_if
+from deadtime.estimation._least_squares import JointModel, Model, Profile, places_of
 from deadtime.estimation._result import REASONS, CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import LEAST_GAIN, standard_errors
-from deadtime.estimation.fit._least_squares import JointModel, Model
-from deadtime.estimation.fit._profile import Profile, places_of
 from deadtime.estimation.likelihood._judgement import Adequacy, unseen_in_words
 from deadtime.estimation.methods._commanded_model import CommandedModel
 from deadtime.estimation.methods._conclusion import COLOURED, advice

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import increasing
+from deadtime.estimation._least_squares import place_of, whiteness_of
 from deadtime.estimation._result import CramerRaoBound
 from deadtime.estimation.data._checks import (
     ROUNDING,
@@ -33,8 +34,6 @@ from deadtime.estimation.data._checks import (
     standard_errors,
     start_and_span,
 )
-from deadtime.estimation.fit._least_squares import place_of
-from deadtime.estimation.fit._residuals import whiteness_of
 from deadtime.estimation.methods._conclusion import COLOURED, OfOne, Read, is_rounding, spreads_of
 from deadtime.estimation.methods._method import Run, check_initial_output
 from deadtime.estimation.methods._waveform import simulated_model

@@ -3,6 +3,9 @@
 Because the command is known, a limit and noise that the controller acts on have no effect, and
 least squares is maximum likelihood for white noise: the standard error is the Cramér-Rao bound. The
 model is in `_commanded_model`. The stages of one estimate are read one after the other: one file.
+
+A log is often stamped where it is written, some time after the sample was taken. The rows then are
+regular and their stamps are not. Where each stamp is near a regular time, either may be true.
 """
 
 from __future__ import annotations
@@ -16,14 +19,19 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import deadtime.estimation._native as native
 import deadtime.estimation.methods._flight_conclusion as flight
 from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._least_squares import Minimum, Model, solve_jointly
+from deadtime.estimation._native import regular_times
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
-from deadtime.estimation.data._known_filter import GivenFilter, known_filter
-from deadtime.estimation.data._stamps import on_regular_times
-from deadtime.estimation.fit._least_squares import Minimum, Model, solve_jointly
 from deadtime.estimation.likelihood._judgement import Adequacy, adequacy_of
 from deadtime.estimation.likelihood._plant import names_in_kernel, plant_model
-from deadtime.estimation.methods._commanded_model import Assumed, CommandedModel, commanded_model
+from deadtime.estimation.methods._commanded_model import (
+    Assumed,
+    CommandedModel,
+    GivenFilter,
+    commanded_model,
+    known_filter,
+)
 from deadtime.estimation.methods._conclusion import (
     check_fit,
     concluded,
@@ -399,3 +407,17 @@ def _given(
         plant = plant._replace({**plant.parameters, **values})
     within = [model.limited(part, values) for model, part in zip(models, rows, strict=True)]
     return plant_model(plant, names.linear, assumed.air == "vehicle"), within
+
+
+def on_regular_times(run: Run) -> Run | None:
+    """The run with the regular times that its stamps scatter around; None where there are none."""
+    check, loop = run.check, run.loop
+    if check is None or check.stamps != "jittered" or loop.sample_time is None:
+        return None
+    if run.recording.sent is not None:
+        return None
+    between = loop.sample_time * (check.rate_ratio or 1)
+    regular = regular_times(run.recording.time, between)
+    if regular is None:
+        return None
+    return run._replace(recording=replace(run.recording, time=regular))

@@ -23,7 +23,7 @@ from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
-import deadtime.estimation.fit._least_squares as least_squares
+import deadtime.estimation._least_squares as least_squares
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import FlightProfile, LoopMisfit
 from deadtime.estimation._result import DelayEstimate

@@ -16,8 +16,8 @@ from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Progress
 from deadtime._base.validation import finite, positive, whole_number
 from deadtime.estimation._estimate import estimate_delay, method_of
+from deadtime.estimation._least_squares import unit_of
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
-from deadtime.estimation.fit._profile import unit_of
 from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._grid import Grid
 from deadtime.estimation.methods._method import Method

@@ -21,8 +21,8 @@ from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.processes import shared_out
 from deadtime._base.progress import Progress
 from deadtime._base.validation import confidence, whole_number
+from deadtime.estimation._least_squares import unit_of
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.fit._profile import unit_of
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-import deadtime.estimation.running._settings as settings
+import deadtime.estimation.running._bank as bank
 from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.validation import finite, non_negative, positive
 from deadtime._base.verdicts import Verdict
@@ -18,7 +18,7 @@ from deadtime.estimation._estimate import estimate_delay
 from deadtime.estimation._native import BankAnswer, OnlineBank
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.methods._output_error import OutputError
-from deadtime.estimation.running._estimate import OnlineEstimate, estimate_of
+from deadtime.estimation.running._bank import OnlineEstimate
 from deadtime.experiments import FlightNoise, Noise
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
@@ -152,29 +152,28 @@ class OnlineEstimator:
         level: float = 0.95,
     ) -> None:
         self._loop = loop
-        points = settings.points_of_range("delays", delays, settings.DELAYS)
-        self._lags = None if lags is None else settings.points_of_range("lags", lags, settings.LAGS)
-        model = settings.linear_plant(loop, ("delay", "gain"))
+        points = bank.points_of_range("delays", delays, bank.DELAYS)
+        self._lags = None if lags is None else bank.points_of_range("lags", lags, bank.LAGS)
+        model = bank.linear_plant(loop, ("delay", "gain"))
         known = loop.parameters.get("gain")
         size = abs(known) if known else 1.0
-        self._settings = settings.BankSettings(
+        self._settings = bank.BankSettings(
             num=model.num,
             den=model.den,
             air_behind_lags=model.air_behind_lags,
             own_lag=model.own_lag,
             delays=points.tolist(),
-            follow=settings.is_range(delays),
+            follow=bank.is_range(delays),
             layers=[
-                (tau, model.zero, [0.0] * points.size)
-                for tau in settings.lag_sets(model, self._lags)
+                (tau, model.zero, [0.0] * points.size) for tau in bank.lag_sets(model, self._lags)
             ],
             gain=(float(known or 1.0), 0.5 * size) if gain is None else gain,
             memory=positive("memory", memory),
             drift=non_negative("drift", drift),
             gain_walk=non_negative("gain_drift", gain_drift * size),
             width=positive("width", width),
-            alarm=settings.alarm_of(false_alarms_per_hour),
-            every=settings.coarser(points),
+            alarm=bank.alarm_of(false_alarms_per_hour),
+            every=bank.coarser(points),
             at_rest=at_rest,
             level=level,
             freedom=GIVEN,
@@ -215,7 +214,7 @@ class OnlineEstimator:
         error = fit.stderr.get("lag", 0.0)
         if "lags" not in options and fit.lag and error > 0.0 and math.isfinite(error):
             low = max(fit.lag - AROUND * error, 0.1 * fit.lag)
-            options["lags"] = (low, fit.lag + AROUND * error, settings.LAGS)
+            options["lags"] = (low, fit.lag + AROUND * error, bank.LAGS)
         options.setdefault("delays", (0.0, max(RANGE[1], BEYOND * fit.delay)))
         spread = fit.stderr.get("gain", 0.0)
         if fit.gain and "gain" not in options and 0.0 < spread < math.inf:
@@ -313,7 +312,7 @@ class OnlineEstimator:
 
     def _estimate(self, answer: BankAnswer) -> OnlineEstimate:
         assert self._noise is not None
-        found = estimate_of(answer, self._noise.white, self.delays, self._doubts)
+        found = bank.estimate_of(answer, self._noise.white, self.delays, self._doubts)
         if found.changed:
             self._changes.append(found.time)
         self._changes = [time for time in self._changes if time > found.time - MINUTE]
@@ -359,7 +358,7 @@ class OnlineEstimator:
                 if fit.verdict == "reliable" or time - self._rows[0][0] >= LAST:
                     return self._replay(fit)
                 self._reason = fit.message
-        found = estimate_of(self._blank.row(time), self._settings.white, self.delays)
+        found = bank.estimate_of(self._blank.row(time), self._settings.white, self.delays)
         return replace(found, message=f"no estimate yet: {self._reason}")
 
     def _forget(self, time: float) -> None:

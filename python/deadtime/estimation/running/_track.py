@@ -15,7 +15,7 @@ from deadtime._base.drawing import Axes, shown_axes
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.verdicts import claimed
-from deadtime.estimation.running._estimate import OnlineEstimate
+from deadtime.estimation.running._bank import OnlineEstimate
 from deadtime.estimation.running._estimator import OnlineEstimator
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
