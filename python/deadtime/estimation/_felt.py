@@ -61,8 +61,10 @@ def seen(loop: ControlLoop, omega: ArrayLike) -> Array:
 def limits(loop: ControlLoop) -> tuple[float, float]:
     """Largest stable proportional gain around the plant, and where half of it crosses over.
 
-    Infinite and NaN where no gain is largest.
+    Infinite and NaN where no gain is largest; both NaN for a plant that limits rates.
     """
+    if not loop.plant.is_linear:
+        return math.nan, math.nan
     around = loop.plant.transfer_function()
     gain = loop.parameters.get("gain", 1.0)
     sign = -1.0 if gain is not None and gain < 0.0 else 1.0
@@ -99,8 +101,6 @@ class Felt(AtCrossover):
 
     @cached_property
     def _limits(self) -> tuple[float, float]:
-        if not self.loop.plant.is_linear:
-            return math.nan, math.nan
         return limits(self.loop)
 
     @property
@@ -154,10 +154,8 @@ class Felt(AtCrossover):
                 "no gain or phase"
             )
         size, phase, late = seen(self.loop, given)
-        ends = np.array(self._ends(lambda loop: seen(loop, given), level))
-        return LoopView(
-            given, np.exp(size), phase, late, np.exp(ends[:, 0]), ends[:, 1], ends[:, 2]
-        )
+        sizes, *others = np.swapaxes(self._ends(lambda loop: seen(loop, given), level), 0, 1)
+        return LoopView(given, np.exp(size), phase, late, np.exp(sizes), *others)
 
     @cached_property
     def _at_crossover(self) -> tuple[float, float, float]:
@@ -200,16 +198,13 @@ class Felt(AtCrossover):
 def _moved(loop: ControlLoop, steps: Mapping[str, float]) -> ControlLoop:
     """The loop with its numbers moved; times stay at zero or above, and the gain keeps its sign."""
     found = {}
-    for name, step in steps.items():
-        if name not in loop.parameters:
-            continue
-        value = loop.parameters[name]
-        new = value + step
+    for name in steps.keys() & loop.parameters.keys():
+        value, step = loop.parameters[name], steps[name]
+        found[name] = value + step
         if name == "gain":
-            new = value * math.exp(step / value)
+            found[name] = value * math.exp(step / value)
         elif name.startswith(("delay", "lag")):
-            new = max(new, 0.0)
-        elif name == "time_constant" or name.startswith("pole_"):
-            new = max(new, LEAST * value)
-        found[name] = new
+            found[name] = max(found[name], 0.0)
+        elif name.startswith(("time_constant", "pole_")):
+            found[name] = max(found[name], LEAST * value)
     return loop.replace(**found)

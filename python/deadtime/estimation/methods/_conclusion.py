@@ -19,26 +19,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+import deadtime.estimation._least_squares as least_squares
+import deadtime.estimation.data._checks as checks
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.verdicts import Verdict, verdict_if
-from deadtime.estimation._least_squares import (
-    Minimum,
-    Model,
-    Profile,
-    Whiteness,
-    least_cost,
-    pieces_of,
-    whiteness_of,
-    without_vanishing as without_vanishing,
-)
 from deadtime.estimation._result import ADVICE, REASONS, CramerRaoBound, DelayEstimate, FittedRun
-from deadtime.estimation.data._checks import (
-    ROUNDING,
-    check_distinguishable,
-    check_response,
-    standard_errors,
-)
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.methods._method import Method, Run
 from deadtime.experiments import FlightNoise
@@ -63,8 +49,8 @@ AT_BOUND = 1e-4
 
 def concluded(
     method: str,
-    model: Model,
-    found: Minimum,
+    model: least_squares.Model,
+    found: least_squares.Minimum,
     fitted: Sequence[Run],
     *,
     message: str,
@@ -99,7 +85,7 @@ def concluded(
     whiteness = check_fit(model, found, fitted)
     reliable = whiteness.white or is_exact(model, found, fitted)
     spread = white if reliable else robust
-    errors, plain = standard_errors(names, spread), standard_errors(names, white)
+    errors, plain = checks.standard_errors(names, spread), checks.standard_errors(names, white)
     freedom = residuals.size - len(loose)
     reason = _why_profile(values, residuals.size, count)
     runs = tuple(
@@ -120,8 +106,8 @@ def concluded(
         message=_message(message, held, reason, reliable, advice(names, runs[0].loop)),
         details={**details, **{name: values[name] for name in ("start",) if name in values}},
         others=runs[1:],
-        _profile=Profile(
-            cost=partial(least_cost, model, found, runs[0].loop.parameters),
+        _profile=least_squares.Profile(
+            cost=partial(least_squares.least_cost, model, found, runs[0].loop.parameters),
             best=found.cost,
             freedom=freedom,
             widening=_widening(values, errors, plain),
@@ -131,35 +117,39 @@ def concluded(
 
 
 def spreads_of(
-    found: Minimum, labels: Sequence[str], loose: list[int], sizes: Sequence[int]
+    found: least_squares.Minimum, labels: Sequence[str], loose: list[int], sizes: Sequence[int]
 ) -> tuple[Array, Array]:
     """Covariances at a minimum, for white residuals and for those with memory.
 
     Zero for parameters that are not `loose`; refuses those that the recording does not distinguish.
     """
-    check_distinguishable(found.jacobian[:, loose], [labels[i] for i in loose])
+    checks.check_distinguishable(found.jacobian[:, loose], [labels[i] for i in loose])
     white, robust = found.spreads(loose, sizes)
     return white, robust
 
 
-def check_fit(model: Model, found: Minimum, fitted: Sequence[Run]) -> Whiteness:
+def check_fit(
+    model: least_squares.Model, found: least_squares.Minimum, fitted: Sequence[Run]
+) -> least_squares.Whiteness:
     """Refuse outputs that are hardly better explained than by a constant; test the residuals."""
     count = len(model.names)
-    whiteness = whiteness_of(-found.misfit, count, model.sizes)
+    whiteness = least_squares.whiteness_of(-found.misfit, count, model.sizes)
     for part, misfit in zip(fitted, _misfits(model, found), strict=True):
-        check_response(part.recording.output, misfit, count, whiteness.autocorrelation)
+        checks.check_response(part.recording.output, misfit, count, whiteness.autocorrelation)
     return whiteness
 
 
-def is_exact(model: Model, found: Minimum, fitted: Sequence[Run]) -> bool:
+def is_exact(
+    model: least_squares.Model, found: least_squares.Minimum, fitted: Sequence[Run]
+) -> bool:
     """Whether all that is left is rounding."""
     pairs = zip(fitted, _misfits(model, found), strict=True)
     return all(is_rounding(misfit, part.recording) for part, misfit in pairs)
 
 
-def _misfits(model: Model, found: Minimum) -> list[Array]:
+def _misfits(model: least_squares.Model, found: least_squares.Minimum) -> list[Array]:
     """The misfit of each recording, without weights."""
-    pieces = pieces_of(found.misfit, model.sizes)
+    pieces = least_squares.pieces_of(found.misfit, model.sizes)
     return [piece / weight for piece, weight in zip(pieces, model.weights, strict=True)]
 
 
@@ -218,7 +208,7 @@ def _message(done: str, held: list[str], reason: str, reliable: bool, advice: st
 
 def is_rounding(residuals: Array, recording: Recording) -> bool:
     """Whether the model explains the recording to rounding."""
-    return float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(recording.output))
+    return float(np.max(np.abs(residuals))) <= checks.ROUNDING * float(np.ptp(recording.output))
 
 
 class Read(NamedTuple):
@@ -250,7 +240,7 @@ class Read(NamedTuple):
     residuals: Array | None = None
     crb: CramerRaoBound | None = None
     verdict: Verdict | None = None
-    profile: Profile | None = None
+    profile: least_squares.Profile | None = None
 
 
 class OfOne(Method):
@@ -280,13 +270,13 @@ class OfOne(Method):
         cov = np.nan if found.cov is None else found.cov
         if not isinstance(cov, np.ndarray):
             cov = np.full((len(names), len(names)), cov**2)
-        whiteness = whiteness_of(residuals, len(names))
+        whiteness = least_squares.whiteness_of(residuals, len(names))
         passes = whiteness.white or is_rounding(residuals, recording)
         return DelayEstimate(
             method=self.name,
             loop=run.loop.replace(**found.values),
             free=names,
-            stderr=standard_errors(names, cov),
+            stderr=checks.standard_errors(names, cov),
             cov=cov,
             crb=found.crb,
             recording=recording,

@@ -23,17 +23,11 @@ from typing import ClassVar
 
 import numpy as np
 
+import deadtime.estimation.data._checks as checks
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.estimation._least_squares import Ends, ModelOfOne, place_of
 from deadtime.estimation._native import ChebyshevMisfit
-from deadtime.estimation.data._checks import (
-    check_excitation,
-    check_gain,
-    delay_and,
-    standard_errors,
-    start_and_span,
-)
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import stiffness_of
 from deadtime.estimation.methods._conclusion import OfOne, Read, spreads_of
@@ -75,7 +69,7 @@ class CTA(OfOne):
 
     def names(self, free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
         """The delay, and what else is asked for."""
-        names = delay_and(free, loop, "cta")
+        names = checks.delay_and(free, loop, "cta")
         stiffness_of(loop, "cta")
         if loop.is_sampled or loop.limit is not None:
             what = "a hold" if loop.is_sampled else "a limit"
@@ -89,7 +83,7 @@ class CTA(OfOne):
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
         loop, data = run.loop, SimulatedRecording(*run[:3]).recording
-        check_excitation(data, len(names))
+        checks.check_excitation(data, len(names))
         model = _Model(data, names, self.initial_output, loop, self.intervals)
         found = model.problem.solve()
         delay, ends = float(found.point[0]), model.ends("delay")
@@ -103,7 +97,7 @@ class CTA(OfOne):
         every = list(range(len(model.labels)))
         cov = spreads_of(found, model.labels, every, model.sizes)[1][:count, :count]
         values = model.values(found.point)
-        check_gain(values, standard_errors(names, cov))
+        checks.check_gain(values, checks.standard_errors(names, cov))
         return Read(
             values,
             cov,
@@ -153,7 +147,7 @@ class _Model(ModelOfOne):
 
     def ends(self, label: str) -> Ends:
         """Bounds and starting values of one of the parameters."""
-        start, span = start_and_span(self.recording)
+        start, span = checks.start_and_span(self.recording)
         gain = self.loop.parameters["gain"]
         return {
             "delay": Ends(1e-4 * span, span, np.geomspace(SHORTEST, LONGEST, POINTS) * span),

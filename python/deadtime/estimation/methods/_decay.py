@@ -18,16 +18,11 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+import deadtime.estimation.data._step_reading as steps
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
 from deadtime.estimation._native import delay_of_rate, step_tail
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.data._step_reading import (
-    CLEARANCE,
-    StepReading,
-    read_decaying_step,
-    stiffness_of,
-)
 from deadtime.estimation.methods._conclusion import OfOne, Read
 from deadtime.estimation.methods._method import Run
 from deadtime.loops import ControlLoop
@@ -69,8 +64,8 @@ class Decay(OfOne):
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
         loop, simulated = run.loop, SimulatedRecording(*run[:3])
-        stiffness = stiffness_of(loop, "decay")
-        reading, extremes = read_decaying_step(simulated.recording, "decay")
+        stiffness = steps.stiffness_of(loop, "decay")
+        reading, extremes = steps.read_decaying_step(simulated.recording, "decay")
         if extremes:
             raise NotIdentifiableError(
                 "the output overshoots, so the rightmost roots are complex, and the tail "
@@ -117,12 +112,12 @@ class Decay(OfOne):
         )
 
 
-def _rate(reading: StepReading, loop: ControlLoop, share: float) -> tuple[float, float, int]:
+def _rate(reading: steps.StepReading, loop: ControlLoop, share: float) -> tuple[float, float, int]:
     """Rate of the tail, where no command was limited, its standard error and number of samples."""
     most = math.inf
     if loop.limit is not None:
         most = loop.limit / (loop.parameters["Kp"] * abs(reading.size))
-    clear = CLEARANCE * reading.noise
+    clear = steps.CLEARANCE * reading.noise
     count, tail = step_tail(reading.since, reading.travelled, share, most, clear, FEWEST)
     if tail is None:
         raise NotIdentifiableError(
@@ -130,7 +125,7 @@ def _rate(reading: StepReading, loop: ControlLoop, share: float) -> tuple[float,
             "faster, record longer, or begin the tail earlier with a larger `tail`"
         )
     height, rate, error = tail
-    if height <= 0.0 or rate <= 0.0 or rate < CLEARANCE * error:
+    if height <= 0.0 or rate <= 0.0 or rate < steps.CLEARANCE * error:
         raise NotIdentifiableError(
             f"the tail decays at {rate:.3g} ± {error:.2g} 1/s, so the rate may be zero. "
             "Begin the tail earlier with a larger `tail`, or use method='waveform'"

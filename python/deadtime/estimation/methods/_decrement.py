@@ -21,16 +21,11 @@ from typing import ClassVar
 
 import numpy as np
 
+import deadtime.estimation.data._step_reading as steps
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import loop_of_extremes
 from deadtime.estimation.data._checks import delay_and
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.data._step_reading import (
-    Extreme,
-    StepReading,
-    read_decaying_step,
-    stiffness_of,
-)
 from deadtime.estimation.methods._conclusion import OfOne, Read
 from deadtime.estimation.methods._method import Run
 from deadtime.loops import ControlLoop
@@ -60,8 +55,8 @@ class Decrement(OfOne):
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
         loop, simulated = run.loop, SimulatedRecording(*run[:3])
-        stiffness = stiffness_of(loop, "decrement")
-        reading, extremes = read_decaying_step(simulated.recording, "decrement")
+        stiffness = steps.stiffness_of(loop, "decrement")
+        reading, extremes = steps.read_decaying_step(simulated.recording, "decrement")
         extremes = _linear(extremes, reading, loop)
         lag, sample_time = loop.parameters["lag"], loop.sample_time
         pair, made = loop_of_extremes(extremes, lag, sample_time)
@@ -112,7 +107,9 @@ class Decrement(OfOne):
         )
 
 
-def _linear(extremes: list[Extreme], reading: StepReading, loop: ControlLoop) -> list[Extreme]:
+def _linear(
+    extremes: list[steps.Extreme], reading: steps.StepReading, loop: ControlLoop
+) -> list[steps.Extreme]:
     """The extremes from the first on at which the command is within its limit."""
     most = math.inf
     if loop.limit is not None:

@@ -26,31 +26,14 @@ from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
+import deadtime.estimation._least_squares as least_squares
+import deadtime.estimation.data._checks as checks
 from deadtime._base.arrays import Array, Indices
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive, whole_number
 from deadtime._base.verdicts import verdict_if
-from deadtime.estimation._least_squares import (
-    Ends,
-    Minimum,
-    ModelOfOne,
-    Profile,
-    least_cost,
-    place_of,
-    whiteness_of,
-)
 from deadtime.estimation._native import LEVEL_OF_TESTS, HeldResponse, LinesMisfit
 from deadtime.estimation._result import ADVICE, REASONS
-from deadtime.estimation.data._checks import (
-    check_distinguishable,
-    check_even,
-    check_gain,
-    check_moves,
-    checked_names,
-    embedded,
-    integrator_of,
-    standard_errors,
-)
 from deadtime.estimation.data._simulated import commands_over_samples
 from deadtime.estimation.methods._conclusion import OfOne, Read, is_rounding
 from deadtime.estimation.methods._method import Run
@@ -104,19 +87,21 @@ class Frequency(OfOne):
 
     def names(self, free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
         """The numbers that are asked for."""
-        return checked_names(free, loop)
+        return checks.checked_names(free, loop)
 
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
         from scipy import special
 
         recording, loop, window, *_ = run
-        integrator_of(loop, "frequency")
+        checks.integrator_of(loop, "frequency")
         data, rows = recording.window(*window), recording.rows(*window)
-        check_even(data, EVEN, "a DFT needs evenly spaced samples. Use method='output_error'")
+        checks.check_even(
+            data, EVEN, "a DFT needs evenly spaced samples. Use method='output_error'"
+        )
         command, source = commands_over_samples(recording, loop)
         commands = recording.time[: rows.stop], command[: rows.stop]
-        check_moves(data.output, command[rows])
+        checks.check_moves(data.output, command[rows])
         top = math.inf if self.highest is None else self.highest
         known = {**loop.parameters, "delay": 0.0 if loop.delay is None else loop.delay}
         if self.period is None:
@@ -128,18 +113,20 @@ class Frequency(OfOne):
         values = lines.values(fit.point)
         loose = [i for i, name in enumerate(names) if name != "lag" or values["lag"] > 0.0]
         jacobian = fit.jacobian[:, loose]
-        check_distinguishable(jacobian, [names[i] for i in loose])
+        checks.check_distinguishable(jacobian, [names[i] for i in loose])
         scale = fit.cost / lines.freedom
         p_value, wider = 1.0, scale
         if lines.known_noise:
             p_value = float(special.chdtrc(lines.freedom, fit.cost / lines.widening))
             wider = max(lines.widening, scale)
-        cov = embedded(np.asarray(wider * np.linalg.inv(jacobian.T @ jacobian)), loose, len(names))
-        errors = standard_errors(names, cov)
-        check_gain(values, errors)
+        cov = checks.embedded(
+            np.asarray(wider * np.linalg.inv(jacobian.T @ jacobian)), loose, len(names)
+        )
+        errors = checks.standard_errors(names, cov)
+        checks.check_gain(values, errors)
         found = {**known, **values}
         residuals = _residuals(data, HeldResponse(*commands), found)
-        whiteness = whiteness_of(residuals, len(names))
+        whiteness = least_squares.whiteness_of(residuals, len(names))
         white = p_value > LEVEL_OF_TESTS if lines.known_noise else whiteness.white
         reliable = white or is_rounding(residuals, data)
         return Read(
@@ -158,8 +145,8 @@ class Frequency(OfOne):
                 "interval"
             ),
             details={"lines": lines.describe, "command": source, "p_value_of_model": p_value},
-            profile=Profile(
-                cost=partial(least_cost, lines, fit, known),
+            profile=least_squares.Profile(
+                cost=partial(least_squares.least_cost, lines, fit, known),
                 best=fit.cost,
                 freedom=lines.freedom,
                 widening=dict.fromkeys(errors, math.sqrt(wider / scale) if scale > 0.0 else 1.0),
@@ -169,7 +156,7 @@ class Frequency(OfOne):
 
 
 @dataclass(frozen=True, eq=False)
-class _Lines(ModelOfOne):
+class _Lines(least_squares.ModelOfOne):
     """The misfit at lines of a spectrum, over its standard deviation where that is known.
 
     `made` makes it of the numbers.
@@ -187,20 +174,20 @@ class _Lines(ModelOfOne):
     def kernel(self) -> LinesMisfit:
         """The misfit of the kernel."""
         numbers = ("delay", "gain", "lag")
-        places = [place_of(name, self.names) for name in numbers]
+        places = [least_squares.place_of(name, self.names) for name in numbers]
         return self.made(
             ([self.known[name] for name in numbers], places, self.recording.sample_time)
         )
 
-    def ends(self, label: str) -> Ends:
+    def ends(self, label: str) -> least_squares.Ends:
         """Bounds and starting values of one of the parameters."""
         if label == "gain":
-            return Ends(-math.inf, math.inf, [self.known["gain"]])
-        return Ends(0.0, math.inf, [self.recording.sample_time])
+            return least_squares.Ends(-math.inf, math.inf, [self.known["gain"]])
+        return least_squares.Ends(0.0, math.inf, [self.recording.sample_time])
 
-    def fit(self) -> Minimum:
+    def fit(self) -> least_squares.Minimum:
         """The parameters of least cost; a lag that does not reduce it is zero."""
-        row, lag = self.recording.sample_time, place_of("lag", self.names)
+        row, lag = self.recording.sample_time, least_squares.place_of("lag", self.names)
         if "delay" not in self.names:
             found = self.problem.solve()
             return self.problem.without_vanishing(found, None, lag, 0.0)

@@ -22,15 +22,10 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
+import deadtime.estimation.data._step_reading as steps
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import first_movement, line_through, rise_tangent
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.data._step_reading import (
-    CLEARANCE,
-    StepReading,
-    read_decaying_step,
-    stiffness_of,
-)
 from deadtime.estimation.methods._conclusion import OfOne, Read
 from deadtime.estimation.methods._method import Run, check_choice
 
@@ -77,11 +72,11 @@ class Graphical(OfOne):
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
         loop, simulated = run.loop, SimulatedRecording(*run[:3])
-        reading, _ = read_decaying_step(simulated.recording, "graphical")
+        reading, _ = steps.read_decaying_step(simulated.recording, "graphical")
         moved = _first_movement(reading)
         delay, stderr = float(reading.since[moved]), math.nan
         if self.construction != "first_movement":
-            stiffness_of(loop, "graphical")
+            steps.stiffness_of(loop, "graphical")
         if self.construction == "two_point":
             delay = _two_point(reading, *self.shares)
         elif self.construction == "tangent":
@@ -110,9 +105,9 @@ class Graphical(OfOne):
         )
 
 
-def _first_movement(reading: StepReading) -> int:
+def _first_movement(reading: steps.StepReading) -> int:
     """Row of the first sample from which on the output stays above the noise."""
-    moved = first_movement(reading.travelled, max(CLEARANCE * reading.noise, LEAST))
+    moved = first_movement(reading.travelled, max(steps.CLEARANCE * reading.noise, LEAST))
     if moved is None:
         raise NotIdentifiableError(
             f"the output moves within the first sample after the step at {reading.step.time:g} "
@@ -121,9 +116,9 @@ def _first_movement(reading: StepReading) -> int:
     return moved
 
 
-def _two_point(reading: StepReading, low: float, high: float) -> float:
+def _two_point(reading: steps.StepReading, low: float, high: float) -> float:
     """Time after the step, s, at which the line through two shares meets the initial output."""
-    if low < CLEARANCE * reading.noise:
+    if low < steps.CLEARANCE * reading.noise:
         raise NotIdentifiableError(
             f"the smaller of `shares`, {low:g}, is too close to the noise, which is "
             f"{reading.noise:.2g} of the step. Give larger `shares`, or a larger step"
@@ -131,7 +126,7 @@ def _two_point(reading: StepReading, low: float, high: float) -> float:
     return line_through(reading.since, reading.travelled, (low, high))
 
 
-def _tangent(reading: StepReading, moved: int, held: float | None) -> tuple[float, float]:
+def _tangent(reading: steps.StepReading, moved: int, held: float | None) -> tuple[float, float]:
     """Time after the step, s, at which the straight part meets the initial output; its error."""
     # Between the last sample that had not moved and the first that had.
     delay = 0.5 * float(reading.since[moved - 1] + reading.since[moved])

@@ -21,19 +21,12 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+import deadtime.estimation.data._checks as checks
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import increasing
 from deadtime.estimation._least_squares import place_of, whiteness_of
 from deadtime.estimation._result import CramerRaoBound
-from deadtime.estimation.data._checks import (
-    ROUNDING,
-    check_ends,
-    check_gain,
-    delay_and,
-    standard_errors,
-    start_and_span,
-)
 from deadtime.estimation.methods._conclusion import COLOURED, OfOne, Read, is_rounding, spreads_of
 from deadtime.estimation.methods._method import Run, check_initial_output
 from deadtime.estimation.methods._waveform import simulated_model
@@ -77,14 +70,14 @@ class Grid(OfOne):
 
     def names(self, free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
         """The numbers that are asked for."""
-        return delay_and(free, loop, "grid")
+        return checks.delay_and(free, loop, "grid")
 
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
         loop, model = run.loop, simulated_model(run, names, self.initial_output)
         model = replace(model, least_lag=0.0)  # where it acts as a delay, a lag is none
         data, labels = model.recording, model.labels
-        start, span = start_and_span(data)
+        start, span = checks.start_and_span(data)
         points = np.geomspace(SHORTEST, LONGEST, POINTS) * span
         grid = np.array([model.low[0], *points[points > model.low[0]]])
         if self.delays is not None:
@@ -95,7 +88,7 @@ class Grid(OfOne):
             grid,
             np.array([guesses.get(label, 0.0) for label in labels]),
             place_of("lag", names),
-            len(data) * (ROUNDING * model.size) ** 2,
+            len(data) * (checks.ROUNDING * model.size) ** 2,
         )
         if int(np.argmin(costs)) == grid.size - 1:
             raise NotIdentifiableError(
@@ -104,15 +97,15 @@ class Grid(OfOne):
                 "Check columns, signs, units and gains, or give other `delays`"
             )
         point, residuals = found.point, -found.misfit
-        check_ends(labels, point, model.low, model.high)
+        checks.check_ends(labels, point, model.low, model.high)
         at_zero = point <= model.low * (1.0 + 1e-6) + 1e-9
         loose = [i for i, name in enumerate(labels) if name != "lag" or not at_zero[i]]
         plain, robust = spreads_of(found, labels, loose, model.sizes)
         white = whiteness_of(residuals, len(names)).white or is_rounding(residuals, data)
         cov = plain if white else robust
-        errors = standard_errors(names, cov)
+        errors = checks.standard_errors(names, cov)
         values = model.values(point)
-        check_gain(values, errors)
+        checks.check_gain(values, errors)
         noise = math.sqrt(found.cost / (residuals.size - len(loose)))
         reach = TWO_SIDED_95 * errors["delay"]
         low, high = max(0.0, float(point[0] - reach)), float(point[0] + reach)
@@ -136,7 +129,7 @@ class Grid(OfOne):
             },
             recording=data,
             residuals=residuals,
-            crb=CramerRaoBound(labels, FlightNoise(noise), standard_errors(names, plain)),
+            crb=CramerRaoBound(labels, FlightNoise(noise), checks.standard_errors(names, plain)),
         )
 
 

@@ -17,26 +17,19 @@ from functools import cached_property, partial
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import deadtime.estimation._native as native
+import deadtime.estimation.methods._commanded_model as commanded
 import deadtime.estimation.methods._flight_conclusion as flight
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._least_squares import Minimum, Model, solve_jointly
+from deadtime.estimation._least_squares import Minimum, Model, solve_jointly, without_vanishing
 from deadtime.estimation._native import regular_times
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
 from deadtime.estimation.likelihood._judgement import Adequacy, adequacy_of
 from deadtime.estimation.likelihood._plant import names_in_kernel, plant_model
-from deadtime.estimation.methods._commanded_model import (
-    Assumed,
-    CommandedModel,
-    GivenFilter,
-    commanded_model,
-    known_filter,
-)
 from deadtime.estimation.methods._conclusion import (
     check_fit,
     concluded,
     is_exact,
-    without_vanishing,
 )
 from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
 from deadtime.loops import ControlLoop
@@ -86,7 +79,7 @@ class OutputError(Method):
     """
 
     initial_output: float | None = None
-    output_filter: GivenFilter | None = None
+    output_filter: commanded.GivenFilter | None = None
     air: Literal["command", "vehicle"] = "command"
     intervals: Literal["all", "sum"] = "all"
     rivals: bool = True
@@ -98,11 +91,11 @@ class OutputError(Method):
         check_initial_output(self.initial_output)
         check_choice("air", self.air, ("command", "vehicle"))
         check_choice("intervals", self.intervals, ("all", "sum"))
-        known_filter(self.output_filter)
+        commanded.known_filter(self.output_filter)
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the response of the plant to the logged commands."""
-        known = known_filter(self.output_filter)
+        known = commanded.known_filter(self.output_filter)
         if self.air == "vehicle" and not all(
             plant_model(r.loop.plant, ()).integrates for r in runs
         ):
@@ -110,14 +103,14 @@ class OutputError(Method):
                 "air='vehicle' needs a plant such as Integrator, which "
                 "integrates the effect of its motors: use air='command'"
             )
-        assumed = Assumed(
+        assumed = commanded.Assumed(
             self.initial_output, output_filter=known, air=self.air, intervals=self.intervals
         )
         return estimate_from_commands(self.name, runs, free, assumed)
 
 
 def estimate_from_commands(
-    method: str, runs: Sequence[Run], free: Sequence[str], assumed: Assumed
+    method: str, runs: Sequence[Run], free: Sequence[str], assumed: commanded.Assumed
 ) -> DelayEstimate:
     """Fit the response to the command: logged, or computed from the recorded output.
 
@@ -144,7 +137,7 @@ def _criterion(estimate: DelayEstimate) -> float:
 
 
 def _estimated(
-    method: str, runs: Sequence[Run], free: Sequence[str], assumed: Assumed
+    method: str, runs: Sequence[Run], free: Sequence[str], assumed: commanded.Assumed
 ) -> DelayEstimate:
     """The estimate in stages: commands, least squares, noise, intervals, tests."""
     names = _Names.of(free, runs[0].loop)
@@ -207,8 +200,8 @@ class _Begun:
     method: str
     runs: Sequence[Run]
     names: _Names
-    assumed: Assumed
-    models: list[CommandedModel]
+    assumed: commanded.Assumed
+    models: list[commanded.CommandedModel]
     white: native.FlightFit
     numbers: dict[str, float]
     whole: native.FlightFit
@@ -358,7 +351,7 @@ def _concluded(begun: _Begun, found: _Likeliest, adequacy: Adequacy) -> DelayEst
     return estimate
 
 
-def _begun(method: str, runs: Sequence[Run], names: _Names, assumed: Assumed) -> _Begun:
+def _begun(method: str, runs: Sequence[Run], names: _Names, assumed: commanded.Assumed) -> _Begun:
     """Least squares on recordings, with gaps in their commands or without if that is likelier."""
     begun = _begun_with(method, runs, names, assumed)
     if any(model.commands.lost for model in begun.models):
@@ -367,9 +360,11 @@ def _begun(method: str, runs: Sequence[Run], names: _Names, assumed: Assumed) ->
     return begun
 
 
-def _begun_with(method: str, runs: Sequence[Run], names: _Names, assumed: Assumed) -> _Begun:
+def _begun_with(
+    method: str, runs: Sequence[Run], names: _Names, assumed: commanded.Assumed
+) -> _Begun:
     """Least squares on recordings whose commands are as `assumed`."""
-    models = [commanded_model(run, names.common, assumed) for run in runs]
+    models = [commanded.commanded_model(run, names.common, assumed) for run in runs]
     _check_others(names.others, models[0].known)
     rows, known = [model.rows for model in models], models[0].known
     given = partial(_given, names, assumed, models, rows)
@@ -396,8 +391,8 @@ def _check_others(names: Sequence[str], known: Mapping[str, float]) -> None:
 
 def _given(
     names: _Names,
-    assumed: Assumed,
-    models: Sequence[CommandedModel],
+    assumed: commanded.Assumed,
+    models: Sequence[commanded.CommandedModel],
     rows: Sequence[native.FlightRows],
     found: Sequence[float],
 ) -> tuple[native.FlightPlant, list[native.FlightRows]]:

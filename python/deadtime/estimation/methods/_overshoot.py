@@ -26,17 +26,10 @@ from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
+import deadtime.estimation.data._step_reading as steps
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import x_of_overshoot
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.data._step_reading import (
-    CLEARANCE,
-    StepReading,
-    check_decays,
-    read_extremes,
-    read_step,
-    stiffness_of,
-)
 from deadtime.estimation.methods._conclusion import OfOne, Read
 from deadtime.estimation.methods._method import Run, check_choice
 
@@ -130,10 +123,10 @@ class Overshoot(OfOne):
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
         loop, simulated = run.loop, SimulatedRecording(*run[:3])
-        stiffness = stiffness_of(loop, "overshoot")
-        reading = read_step(simulated.recording)
+        stiffness = steps.stiffness_of(loop, "overshoot")
+        reading = steps.read_step(simulated.recording)
         if self.map != "saturated":  # which simulates the limit
-            check_decays(read_extremes(reading), "overshoot")
+            steps.check_decays(steps.read_extremes(reading), "overshoot")
         overshoot, noise = _overshoot(reading)
 
         def delay_of(value: float) -> float:
@@ -171,26 +164,26 @@ class Overshoot(OfOne):
         )
 
 
-def _overshoot(reading: StepReading) -> tuple[float, float]:
+def _overshoot(reading: steps.StepReading) -> tuple[float, float]:
     """The overshoot of a step response as a share of the step, and its standard deviation.
 
     Refuses a response without overshoot.
     """
     value = float(np.max(reading.travelled)) - 1.0
     settled = max(0.0, float(np.mean(reading.tail)) - 1.0)
-    if value - settled <= max(CLEARANCE * reading.noise, 1e-9):
+    if value - settled <= max(steps.CLEARANCE * reading.noise, 1e-9):
         beyond = max(0.0, value - settled)
         raise NotIdentifiableError(
             "there is no overshoot: the output exceeds its final value by "
             f"{100 * beyond:.2g} % of the step, and noise alone by "
-            f"{100 * CLEARANCE * reading.noise:.2g} %. Kp·Td is below or near 1/e, where "
+            f"{100 * steps.CLEARANCE * reading.noise:.2g} %. Kp·Td is below or near 1/e, where "
             "the overshoot does not determine the delay. Raise Kp, or use method='waveform'"
         )
     return value, reading.noise * math.sqrt(1.0 + 1.0 / reading.start_samples)
 
 
 def _saturated_delay(
-    overshoot: float, reading: StepReading, simulated: SimulatedRecording, start: float
+    overshoot: float, reading: steps.StepReading, simulated: SimulatedRecording, start: float
 ) -> float:
     """Delay at which the simulated loop overshoots by this much at the recorded times."""
     from scipy.optimize import brentq

@@ -24,19 +24,10 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 
 import deadtime.estimation._least_squares as least_squares
+import deadtime.estimation.data._checks as checks
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import FlightProfile, LoopMisfit
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._checks import (
-    LOOP_PARAMETERS,
-    ROUNDING,
-    VEHICLE_PARAMETERS,
-    check_ends,
-    check_excitation,
-    checked_names,
-    excited,
-    start_and_span,
-)
 from deadtime.estimation.data._simulated import SimulatedRecording, shortest_time
 from deadtime.estimation.methods._commanded_model import Assumed
 from deadtime.estimation.methods._conclusion import concluded
@@ -100,11 +91,11 @@ class Waveform(Method):
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the windows of the runs."""
         computed = Assumed(self.initial_output, computed=True)
-        factors = set(runs[0].loop.plant.parameters) - set(VEHICLE_PARAMETERS)
+        factors = set(runs[0].loop.plant.parameters) - set(checks.VEHICLE_PARAMETERS)
         if self.noise == "loop" or (self.noise == "auto" and factors & set(free)):
             return estimate_from_commands(self.name, runs, free, computed)
         simulated = self._by_simulation(runs, free)
-        if self.noise == "recording" or not set(free) <= set(VEHICLE_PARAMETERS):
+        if self.noise == "recording" or not set(free) <= set(checks.VEHICLE_PARAMETERS):
             return simulated
         try:
             innovations = estimate_from_commands(self.name, runs, free, computed)
@@ -116,11 +107,11 @@ class Waveform(Method):
         return simulated if likelier > LIKELIHOOD_RATIO else innovations
 
     def _by_simulation(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
-        names = checked_names(free, runs[0].loop, LOOP_PARAMETERS)
+        names = checks.checked_names(free, runs[0].loop, checks.LOOP_PARAMETERS)
         models = [simulated_model(run, names, self.initial_output) for run in runs]
         model, found = least_squares.solve_jointly(models)
         found = least_squares.without_vanishing(model, found)
-        check_ends(names, found.point, model.low, model.high)
+        checks.check_ends(names, found.point, model.low, model.high)
         return concluded(
             self.name,
             model,
@@ -145,7 +136,7 @@ def _unlikelihood(fit: DelayEstimate) -> float:
         return 0.5 * fitted.criterion + PRICE_OF_AIR * disturbed
     total = 0.0
     for run in fit.runs:
-        scatter = max(float(np.std(run.residuals)), ROUNDING * excited(run.recording))
+        scatter = max(float(np.std(run.residuals)), checks.ROUNDING * checks.excited(run.recording))
         total += run.residuals.size * math.log(scatter)
     return total
 
@@ -165,7 +156,7 @@ class SimulatedModel(least_squares.ModelOfOne):
     def ends(self, label: str) -> least_squares.Ends:
         """Bounds and starting values of one of the parameters."""
         recording, loop = self.recording, self.simulated.loop
-        start, span = start_and_span(recording)
+        start, span = checks.start_and_span(recording)
         shortest = lag = shortest_time(recording)
         if loop.is_sampled:
             shortest, lag = 0.0, self.least_lag * recording.sample_time
@@ -190,5 +181,5 @@ def simulated_model(
     """The model of one recording; refuses one without excitation."""
     simulated = SimulatedRecording(*run[:3])
     in_motion = simulated.recording.time[0] > run.recording.time[0]
-    check_excitation(simulated.recording, len(names), in_motion=in_motion)
+    checks.check_excitation(simulated.recording, len(names), in_motion=in_motion)
     return SimulatedModel(simulated.recording, names, offset, simulated)
