@@ -14,7 +14,7 @@ from deadtime._deadtime import (
     PlantNumbers,
     RowNoise,
 )
-from deadtime.estimation.likelihood._plant import Disturbance
+from deadtime.estimation._plant import Disturbance
 from deadtime.estimation.running._bank import BankSettings
 
 WHITE, AIR, AIR_TIME, SENSOR, SENSOR_TIME = 0.006, 0.08, 0.9, 0.004, 0.2

@@ -9,9 +9,9 @@ while the loop runs. Each method is a class that holds its options.
 # The files. `_estimate` chooses and runs a method, `_compare` runs several, `_choose` tries several
 # plants, `_result` is what they return, `_shared` combines several. `evidence` finds the plant of a
 # recording without a loop. `methods` holds one file a method, `data` what they read from a
-# recording, `_least_squares` models, profiles and residuals, `likelihood` plant and noise as the
-# kernel takes them, `planning` the bounds of planned experiments, `running` what is estimated while
-# a loop runs.
+# recording, `_least_squares` models, profiles and residuals, `_plant` plant and noise as the kernel
+# takes them, `planning` the bounds of planned experiments, `running` what is estimated while a loop
+# runs.
 
 from deadtime.estimation._choose import (
     PLANT_COLUMNS as PLANT_COLUMNS,
@@ -40,18 +40,17 @@ from deadtime.estimation._plots import (
 )
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation._shared import SharedNumber, shared_number
-from deadtime.estimation.evidence._candidate import PlantCandidate
-from deadtime.estimation.evidence._causes import Cause, SensorFault
 from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._find import refit as refit
+from deadtime.estimation.evidence._found import Cause, PlantCandidate, SensorFault
 from deadtime.estimation.evidence._numbers import FittedRecording, LoopView
 from deadtime.estimation.evidence._question import PLANTS as PLANTS
 from deadtime.estimation.evidence._words import Advice
-from deadtime.estimation.likelihood._judgement import unseen_in_words as unseen_in_words
 from deadtime.estimation.methods._arx_scan import ARXScan
 from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._decay import Decay
 from deadtime.estimation.methods._decrement import Decrement
+from deadtime.estimation.methods._flight_conclusion import unseen_in_words as unseen_in_words
 from deadtime.estimation.methods._frequency import Frequency
 from deadtime.estimation.methods._gcc import GCC
 from deadtime.estimation.methods._graphical import Graphical

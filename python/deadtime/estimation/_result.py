@@ -21,7 +21,7 @@ from deadtime._base.verdicts import NOT_CLAIMED, Verdict, claimed, rough
 from deadtime.estimation._felt import FELT, WORDS, Felt, highest_excited
 from deadtime.estimation._least_squares import Profile, Whiteness, floor_of, unit_of
 from deadtime.estimation._native import FlightProfile
-from deadtime.estimation.likelihood._plant import behind_limits
+from deadtime.estimation._plant import behind_limits
 from deadtime.experiments import FlightNoise
 from deadtime.loops import Controller, ControlLoop, Explorer, explorer_of
 from deadtime.recordings import Recording

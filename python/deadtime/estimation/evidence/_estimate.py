@@ -10,7 +10,7 @@ from typing import Any
 from deadtime._base.drawing import Axes, Figure, new_figure, shown_rows
 from deadtime._base.notebook import Pictured
 from deadtime._base.plain import plain
-from deadtime.estimation.evidence._causes import Cause, SensorFault
+from deadtime.estimation.evidence._found import Cause, SensorFault
 from deadtime.estimation.evidence._numbers import FoundPlant
 from deadtime.estimation.evidence._words import Advice, advice_on, headline_of, lines_of, summary_of
 

@@ -15,8 +15,7 @@ from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import confidence, one_dimensional
 from deadtime._base.verdicts import Verdict
-from deadtime.estimation.evidence._candidate import CLEAR, PlantCandidate, plant_of
-from deadtime.estimation.evidence._causes import Cause, SensorFault
+from deadtime.estimation.evidence._found import CLEAR, Cause, PlantCandidate, SensorFault, plant_of
 from deadtime.estimation.evidence._question import Question
 from deadtime.loops import Controller, ControlLoop, Plant
 from deadtime.recordings import Recording

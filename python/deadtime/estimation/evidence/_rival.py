@@ -26,8 +26,8 @@ from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import rough
 from deadtime.estimation._result import DelayEstimate, bic
 from deadtime.estimation.data._simulated import moves_between_rows
-from deadtime.estimation.evidence._candidate import CLEAR, PlantCandidate, candidate_of
 from deadtime.estimation.evidence._find import is_outside
+from deadtime.estimation.evidence._found import CLEAR, PlantCandidate, candidate_of
 from deadtime.estimation.evidence._question import PLANTS, Question, question_of
 from deadtime.estimation.methods._method import Method, Run
 from deadtime.estimation.methods._output_error import OutputError

@@ -12,7 +12,7 @@ from deadtime._base.digits import between, shown
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import rough
-from deadtime.estimation.evidence._candidate import CLEAR
+from deadtime.estimation.evidence._found import CLEAR
 from deadtime.estimation.evidence._numbers import FoundPlant
 from deadtime.estimation.evidence._question import Question
 from deadtime.loops import Controller

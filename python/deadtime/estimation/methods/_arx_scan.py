@@ -25,9 +25,7 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.estimation._native import arx_losses, held_losses
 from deadtime.estimation.data._input_output import first_shift, read_input_output
-from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.methods._conclusion import OfOne, Read
-from deadtime.estimation.methods._method import Run
+from deadtime.estimation.methods._method import OfOne, Read, Run
 
 #: Significance level of the F test that the command improves the model.
 F_TEST_LEVEL = 1e-4
@@ -66,7 +64,7 @@ class ARXScan(OfOne):
 
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
-        loop, simulated = run.loop, SimulatedRecording(*run[:3])
+        loop, simulated = run.loop, run.simulated
         data = simulated.recording
         read = read_input_output(simulated, "arx_scan")
         _, least = first_shift(data, "arx_scan")

@@ -24,9 +24,9 @@ import deadtime.estimation._native as native
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._least_squares import Ends, ModelOfOne, place_of
+from deadtime.estimation._plant import behind_limits, plant_model
 from deadtime.estimation.data._checks import check_moves
 from deadtime.estimation.data._simulated import commands_of, limited
-from deadtime.estimation.likelihood._plant import behind_limits, plant_model
 from deadtime.estimation.methods._method import Run
 from deadtime.loops import FirstOrder, Integrator, P, Plant, RateLimited
 from deadtime.recordings import Recording

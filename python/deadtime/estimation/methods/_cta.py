@@ -28,10 +28,8 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.estimation._least_squares import Ends, ModelOfOne, place_of
 from deadtime.estimation._native import ChebyshevMisfit
-from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import stiffness_of
-from deadtime.estimation.methods._conclusion import OfOne, Read, spreads_of
-from deadtime.estimation.methods._method import Run, check_initial_output
+from deadtime.estimation.methods._method import OfOne, Read, Run, check_initial_output, spreads_of
 from deadtime.loops import ControlLoop
 
 #: Points of the initial grid over the delay, and its ends as shares of the window.
@@ -82,7 +80,7 @@ class CTA(OfOne):
 
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
-        loop, data = run.loop, SimulatedRecording(*run[:3]).recording
+        loop, data = run.loop, run.simulated.recording
         checks.check_excitation(data, len(names))
         model = _Model(data, names, self.initial_output, loop, self.intervals)
         found = model.problem.solve()

@@ -22,9 +22,7 @@ import deadtime.estimation.data._step_reading as steps
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
 from deadtime.estimation._native import delay_of_rate, step_tail
-from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.methods._conclusion import OfOne, Read
-from deadtime.estimation.methods._method import Run
+from deadtime.estimation.methods._method import OfOne, Read, Run
 from deadtime.loops import ControlLoop
 
 #: Fewest samples of a tail.
@@ -63,7 +61,7 @@ class Decay(OfOne):
 
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
-        loop, simulated = run.loop, SimulatedRecording(*run[:3])
+        loop, simulated = run.loop, run.simulated
         stiffness = steps.stiffness_of(loop, "decay")
         reading, extremes = steps.read_decaying_step(simulated.recording, "decay")
         if extremes:

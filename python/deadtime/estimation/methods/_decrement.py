@@ -25,9 +25,7 @@ import deadtime.estimation.data._step_reading as steps
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import loop_of_extremes
 from deadtime.estimation.data._checks import delay_and
-from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.methods._conclusion import OfOne, Read
-from deadtime.estimation.methods._method import Run
+from deadtime.estimation.methods._method import OfOne, Read, Run
 from deadtime.loops import ControlLoop
 
 
@@ -54,7 +52,7 @@ class Decrement(OfOne):
 
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
-        loop, simulated = run.loop, SimulatedRecording(*run[:3])
+        loop, simulated = run.loop, run.simulated
         stiffness = steps.stiffness_of(loop, "decrement")
         reading, extremes = steps.read_decaying_step(simulated.recording, "decrement")
         extremes = _linear(extremes, reading, loop)

@@ -35,8 +35,7 @@ from deadtime._base.verdicts import verdict_if
 from deadtime.estimation._native import LEVEL_OF_TESTS, HeldResponse, LinesMisfit
 from deadtime.estimation._result import ADVICE, REASONS
 from deadtime.estimation.data._simulated import commands_over_samples
-from deadtime.estimation.methods._conclusion import OfOne, Read, is_rounding
-from deadtime.estimation.methods._method import Run
+from deadtime.estimation.methods._method import OfOne, Read, Run, is_rounding
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 

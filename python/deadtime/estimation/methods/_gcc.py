@@ -24,9 +24,7 @@ import numpy as np
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import correlation_coefficient, correlation_peak
 from deadtime.estimation.data._input_output import InputOutput, first_shift, read_input_output
-from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.methods._conclusion import OfOne, Read
-from deadtime.estimation.methods._method import Run, check_choice
+from deadtime.estimation.methods._method import OfOne, Read, Run, check_choice
 
 Weighting = Literal["none", "scot", "phat", "prewhitened"]
 
@@ -63,7 +61,7 @@ class GCC(OfOne):
 
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
-        loop, simulated = run.loop, SimulatedRecording(*run[:3])
+        loop, simulated = run.loop, run.simulated
         data = simulated.recording
         read = read_input_output(simulated, "gcc")
         if int(np.count_nonzero(np.diff(read.command))) < 2:

@@ -25,9 +25,7 @@ from typing import ClassVar, Literal, get_args
 import deadtime.estimation.data._step_reading as steps
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import first_movement, line_through, rise_tangent
-from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.methods._conclusion import OfOne, Read
-from deadtime.estimation.methods._method import Run, check_choice
+from deadtime.estimation.methods._method import OfOne, Read, Run, check_choice
 
 Construction = Literal["tangent", "two_point", "first_movement"]
 
@@ -71,7 +69,7 @@ class Graphical(OfOne):
 
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
-        loop, simulated = run.loop, SimulatedRecording(*run[:3])
+        loop, simulated = run.loop, run.simulated
         reading, _ = steps.read_decaying_step(simulated.recording, "graphical")
         moved = _first_movement(reading)
         delay, stderr = float(reading.since[moved]), math.nan

@@ -27,8 +27,15 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import increasing
 from deadtime.estimation._least_squares import place_of, whiteness_of
 from deadtime.estimation._result import CramerRaoBound
-from deadtime.estimation.methods._conclusion import COLOURED, OfOne, Read, is_rounding, spreads_of
-from deadtime.estimation.methods._method import Run, check_initial_output
+from deadtime.estimation.methods._method import (
+    COLOURED,
+    OfOne,
+    Read,
+    Run,
+    check_initial_output,
+    is_rounding,
+    spreads_of,
+)
 from deadtime.estimation.methods._waveform import simulated_model
 from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop

@@ -22,16 +22,19 @@ import deadtime.estimation.methods._flight_conclusion as flight
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._least_squares import Minimum, Model, solve_jointly, without_vanishing
 from deadtime.estimation._native import regular_times
+from deadtime.estimation._plant import names_in_kernel, plant_model
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
-from deadtime.estimation.likelihood._judgement import Adequacy, adequacy_of
-from deadtime.estimation.likelihood._plant import names_in_kernel, plant_model
-from deadtime.estimation.methods._conclusion import (
+from deadtime.estimation.methods._flight_conclusion import Adequacy, adequacy_of
+from deadtime.estimation.methods._method import (
+    Method,
+    Run,
+    check_choice,
     check_fit,
+    check_initial_output,
     concluded,
     is_exact,
 )
-from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
 from deadtime.loops import ControlLoop
 
 #: Residuals of a first fit below which, as a share of the range of the output, all may be rounding.

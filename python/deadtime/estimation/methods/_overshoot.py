@@ -30,8 +30,7 @@ import deadtime.estimation.data._step_reading as steps
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import x_of_overshoot
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.methods._conclusion import OfOne, Read
-from deadtime.estimation.methods._method import Run, check_choice
+from deadtime.estimation.methods._method import OfOne, Read, Run, check_choice
 
 OvershootMap = Literal["dominant", "exact", "saturated"]
 
@@ -122,7 +121,7 @@ class Overshoot(OfOne):
 
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
-        loop, simulated = run.loop, SimulatedRecording(*run[:3])
+        loop, simulated = run.loop, run.simulated
         stiffness = steps.stiffness_of(loop, "overshoot")
         reading = steps.read_step(simulated.recording)
         if self.map != "saturated":  # which simulates the limit

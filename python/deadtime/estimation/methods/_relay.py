@@ -27,8 +27,7 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
 from deadtime.estimation.data._checks import integrator_of
 from deadtime.estimation.data._step_reading import noise_of_second_differences
-from deadtime.estimation.methods._conclusion import OfOne, Read
-from deadtime.estimation.methods._method import Run
+from deadtime.estimation.methods._method import OfOne, Read, Run
 from deadtime.recordings import Recording
 
 #: Crossings at the beginning that are left out: from rest, where noise alone switches the relay,

@@ -30,8 +30,13 @@ from deadtime.estimation._native import FlightProfile, LoopMisfit
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._simulated import SimulatedRecording, shortest_time
 from deadtime.estimation.methods._commanded_model import Assumed
-from deadtime.estimation.methods._conclusion import concluded
-from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
+from deadtime.estimation.methods._method import (
+    Method,
+    Run,
+    check_choice,
+    check_initial_output,
+    concluded,
+)
 from deadtime.estimation.methods._output_error import estimate_from_commands
 
 #: Price of air, as ln L, where a fit with it is compared with a simulation without.
@@ -179,7 +184,7 @@ def simulated_model(
     run: Run, names: tuple[str, ...], offset: float | None = None
 ) -> SimulatedModel:
     """The model of one recording; refuses one without excitation."""
-    simulated = SimulatedRecording(*run[:3])
+    simulated = run.simulated
     in_motion = simulated.recording.time[0] > run.recording.time[0]
     checks.check_excitation(simulated.recording, len(names), in_motion=in_motion)
     return SimulatedModel(simulated.recording, names, offset, simulated)

@@ -14,7 +14,7 @@ from deadtime._base.digits import between
 from deadtime._base.validation import interval, non_negative
 from deadtime._base.verdicts import Verdict, claimed, verdict_if
 from deadtime.estimation._native import BankAnswer, FlightPlant
-from deadtime.estimation.likelihood._plant import Disturbance, disturbances_of, plant_model
+from deadtime.estimation._plant import Disturbance, disturbances_of, plant_model
 from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop
 
