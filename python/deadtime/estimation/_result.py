@@ -71,6 +71,11 @@ class FittedRun(ReadOnlyArrays):
     noise: FlightNoise | None = None
 
 
+def of_runs(runs: tuple[FittedRun, ...]) -> dict[str, Any]:
+    """The fields of a `DelayEstimate` that have the runs."""
+    return {**vars(runs[0]), "others": runs[1:]}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
     """An estimated delay, with the fitted loop and the uncertainty of every fitted parameter.

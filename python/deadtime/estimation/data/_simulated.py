@@ -52,13 +52,18 @@ def known_commands(recording: Recording, loop: ControlLoop) -> tuple[Array, str]
     """
     if recording.command is not None:
         return limited(recording.command, loop), "logged"
-    if not isinstance(loop.controller, P):
+    command = commands_by_law(recording, loop)
+    if command is None:
         raise NotIdentifiableError(
             "the recording has no command, and a command can be computed from reference and "
             "output only for a P controller. Log the command, or use method='waveform'"
         )
-    command = loop.controller.Kp * (recording.reference - recording.output)
-    return limited(command, loop), "computed from reference and output"
+    return command, "computed from reference and output"
+
+
+def commands_by_law(recording: Recording, loop: ControlLoop) -> Array | None:
+    """Commands of a P controller, within its limit; None of other controllers."""
+    return Columns(recording.time, recording.reference, recording.output, None).commands(loop)
 
 
 def limited(command: Array, loop: ControlLoop) -> Array:
@@ -74,10 +79,9 @@ def moves_between_rows(recording: Recording, loop: ControlLoop) -> bool:
     """
     if loop.is_sampled or recording.command is None or recording.sent is not None:
         return False
-    if not isinstance(loop.controller, P):
+    computed, logged = commands_by_law(recording, loop), limited(recording.command, loop)
+    if computed is None:
         return False
-    computed, _ = known_commands(replace(recording, command=None), loop)
-    logged, _ = known_commands(recording, loop)
     return float(np.std(computed - logged)) < ALIKE * float(np.std(logged))
 
 
@@ -220,11 +224,10 @@ def _past_commands(recording: Recording, loop: ControlLoop, start: int) -> Array
     """Commands before row `start`, where the loop is sampled and the rows determine them."""
     if loop.sample_time is None or start == 0:
         return np.empty(0)
-    if recording.command is not None:
-        return recording.command[:start]
-    if not isinstance(loop.controller, P):
-        return np.empty(0)
-    return known_commands(recording, loop)[0][:start]
+    command = recording.command
+    if command is None:
+        command = commands_by_law(recording, loop)
+    return np.empty(0) if command is None else command[:start]
 
 
 #: Rows further apart than so many times the usual are not neighbours.
@@ -245,8 +248,7 @@ def on_its_row(recording: Recording, loop: ControlLoop, check: RecordingCheck) -
     assert recording.command is not None
     time, command = recording.time, recording.command
     largest = loop.limit or check.limit_seen or float(np.max(np.abs(command)))
-    columns = Columns(time, recording.reference, recording.output, None)
-    law = columns.commands(loop.replace(limit=largest))
+    law = commands_by_law(recording, loop.replace(limit=largest))
     assert law is not None
     wanted = np.arange(time.size) + rows
     places = np.clip(wanted, 0, time.size - 1)

@@ -15,9 +15,9 @@ from deadtime._base.arrays import Array
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import OpenRange, is_range, open_interval, positive
-from deadtime.estimation.data._simulated import on_its_row, rows_off
+from deadtime.estimation.data._simulated import commands_by_law, on_its_row, rows_off
 from deadtime.loops import Controller, ControlLoop, Integrator, P
-from deadtime.recordings import Columns, Recording
+from deadtime.recordings import Recording
 
 
 def given_recordings(recording: Any) -> list[Any]:
@@ -252,8 +252,7 @@ def _with_command(
             "and output only for a P controller. Name the column of the command"
         )
     if recording.command is None:
-        columns = Columns(recording.time, recording.reference, recording.output, None)
-        return replace(recording, command=columns.commands(loop)), 0
+        return replace(recording, command=commands_by_law(recording, loop)), 0
     check = recording.check(loop) if has_law else None
     if check is None or not (rows := rows_off(check)):
         return recording, 0

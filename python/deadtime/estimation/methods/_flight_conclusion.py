@@ -19,7 +19,7 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.verdicts import verdict_if
 from deadtime.estimation._least_squares import JointModel, Model, Profile, Whiteness, places_of
 from deadtime.estimation._native import FlightFinding, FlightProfile
-from deadtime.estimation._result import REASONS, CramerRaoBound, DelayEstimate, FittedRun
+from deadtime.estimation._result import REASONS, CramerRaoBound, DelayEstimate, FittedRun, of_runs
 from deadtime.estimation.data._checks import LEAST_GAIN, standard_errors
 from deadtime.estimation.methods._commanded_model import CommandedModel
 from deadtime.estimation.methods._method import COLOURED, Run, advice
@@ -176,23 +176,18 @@ def concluded_flight(
     ending = f"; {unseen_in_words(unseen)} have been seen"
     if adequacy.reasons:
         ending = f"{REASONS}{'; '.join(adequacy.reasons)}{advice(names, runs[0].loop)}"
-    labels = (*names, *(["initial output"] if fit.runs[0].offset else []))
-    labels += ("trim",) * fit.trim
+    labels = (*names, *["initial output"] * fit.runs[0].offset, *["trim"] * fit.trim)
     return DelayEstimate(
+        **of_runs(fitted),
         method=method,
-        loop=fitted[0].loop,
         free=names,
         stderr=stderr,
         cov=profile.cov,
         crb=CramerRaoBound(labels, noise[0], least),
-        recording=fitted[0].recording,
-        residuals=fitted[0].residuals,
         whiteness=adequacy.whiteness,
         verdict=verdict_if(not adequacy.reasons),
         message="; ".join([message, str(noise[0]), *_remarks(left_out, scatter, held)]) + ending,
         details={**details, "rows_left_out": left_out, "unseen_lag": unseen, **scatter},
-        others=fitted[1:],
-        noise=noise[0],
         _profile=profile,
     )
 
@@ -270,15 +265,12 @@ def read_as_intervals(estimate: DelayEstimate, models: Sequence[CommandedModel])
     message = estimate.message.replace(str(estimate.noise), f"{noise[0]} before the rounding")
     return replace(
         estimate,
-        loop=runs[0].loop,
+        **of_runs(runs),
         stderr={name: error * unseen[name] for name, error in plain.items()},
         cov=peak.cov[:count, :count],
         crb=CramerRaoBound(model.labels, noise[0], plain),
-        residuals=runs[0].residuals,
-        noise=noise[0],
         message=f"{message}; each row is an interval as wide as its rounding",
         details={**estimate.details, "initial_output": parts[0].start_of(peak.point)},
-        others=runs[1:],
         _profile=Profile(
             partial(_rounded_cost, model, readings, peak, runs[0].loop.parameters, freedom),
             best=float(freedom),

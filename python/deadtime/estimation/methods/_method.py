@@ -29,7 +29,14 @@ from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import OpenRange, finite, open_interval
 from deadtime._base.verdicts import Verdict, verdict_if
-from deadtime.estimation._result import ADVICE, REASONS, CramerRaoBound, DelayEstimate, FittedRun
+from deadtime.estimation._result import (
+    ADVICE,
+    REASONS,
+    CramerRaoBound,
+    DelayEstimate,
+    FittedRun,
+    of_runs,
+)
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.evidence._question import given_recordings, one_each
 from deadtime.experiments import FlightNoise
@@ -185,19 +192,16 @@ def concluded(
         for part, misfit in zip(fitted, _misfits(model, found), strict=True)
     )
     return DelayEstimate(
+        **of_runs(runs),
         method=method,
-        loop=runs[0].loop,
         free=names,
         stderr=errors,
         cov=spread[:count, :count],
         crb=CramerRaoBound(labels, FlightNoise(math.sqrt(found.cost / freedom)), plain),
-        recording=runs[0].recording,
-        residuals=runs[0].residuals,
         whiteness=whiteness,
         verdict=verdict_if(reliable),
         message=_message(message, held, reason, reliable, advice(names, runs[0].loop)),
         details={**details, **{name: values[name] for name in ("start",) if name in values}},
-        others=runs[1:],
         _profile=least_squares.Profile(
             cost=partial(least_squares.least_cost, model, found, runs[0].loop.parameters),
             best=found.cost,

@@ -21,7 +21,6 @@ import deadtime.estimation.methods._commanded_model as commanded
 import deadtime.estimation.methods._flight_conclusion as flight
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._least_squares import Minimum, Model, solve_jointly, without_vanishing
-from deadtime.estimation._native import regular_times
 from deadtime.estimation._plant import names_in_kernel, plant_model
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
@@ -99,9 +98,8 @@ class OutputError(Method):
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the response of the plant to the logged commands."""
         known = commanded.known_filter(self.output_filter)
-        if self.air == "vehicle" and not all(
-            plant_model(r.loop.plant, ()).integrates for r in runs
-        ):
+        integrating = (plant_model(run.loop.plant, ()).integrates for run in runs)
+        if self.air == "vehicle" and not all(integrating):
             raise ValueError(
                 "air='vehicle' needs a plant such as Integrator, which "
                 "integrates the effect of its motors: use air='command'"
@@ -334,22 +332,12 @@ def _concluded(begun: _Begun, found: _Likeliest, adequacy: Adequacy) -> DelayEst
     if adequacy.coloured:
         profile = profile.coloured()
         message += ", with wider intervals because the residuals are coloured also at rest"
+    fit, details = profile.fit, begun.details(profile.fit.initial_output)
     estimate = flight.concluded_flight(
-        begun.method,
-        begun.names.linear,
-        found.fitted,
-        profile,
-        message,
-        begun.details(profile.fit.initial_output),
-        adequacy,
+        begun.method, begun.names.linear, found.fitted, profile, message, details, adequacy
     )
     plain = begun.names.are_common and profile.is_plain and not adequacy.coloured
-    if (
-        plain
-        and not profile.fit.is_long
-        and estimate.verdict == "reliable"
-        and profile.fit.is_rounding_alone
-    ):
+    if plain and not fit.is_long and estimate.verdict == "reliable" and fit.is_rounding_alone:
         return flight.read_as_intervals(estimate, begun.models)
     return estimate
 
@@ -409,13 +397,10 @@ def _given(
 
 def on_regular_times(run: Run) -> Run | None:
     """The run with the regular times that its stamps scatter around; None where there are none."""
-    check, loop = run.check, run.loop
-    if check is None or check.stamps != "jittered" or loop.sample_time is None:
+    check, sample_time, recording = run.check, run.loop.sample_time, run.recording
+    if check is None or check.stamps != "jittered":
         return None
-    if run.recording.sent is not None:
+    if sample_time is None or recording.sent is not None:
         return None
-    between = loop.sample_time * (check.rate_ratio or 1)
-    regular = regular_times(run.recording.time, between)
-    if regular is None:
-        return None
-    return run._replace(recording=replace(run.recording, time=regular))
+    regular = native.regular_times(recording.time, sample_time * (check.rate_ratio or 1))
+    return None if regular is None else run._replace(recording=replace(recording, time=regular))

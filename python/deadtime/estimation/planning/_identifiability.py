@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -333,31 +334,23 @@ def identifiability(
     seeds = np.random.SeedSequence(seed).spawn(count)
     recordings = [experiment.run(loop, noise, number) for number in seeds] or [recording]
     asked = run_loop, names, offset, noise
-    cases = {
-        "command logged": partial(bound_with_command, *asked, recordings),
-        "reference only": partial(bound_with_reference, *asked, experiment, recording),
-    }
-    (logged, alone), remarks = _found(cases)
+    remarks: list[str] = []
+
+    def found(label: str, of: Callable[..., PlannedBound], *given: Any) -> PlannedBound | None:
+        """A bound, or a remark why there is none."""
+        try:
+            return of(*asked, *given)
+        except (NotIdentifiableError, ValueError) as refusal:
+            remarks.append(f"{label}: {refusal}")
+        return None
+
+    logged = found("command logged", bound_with_command, recordings)
+    alone = found("reference only", bound_with_reference, experiment, recording)
     if logged is None and (alone is None or run_loop.is_sampled):
         raise NotIdentifiableError("; ".join(remarks))
     return Identifiability(
         loop, experiment, names, noise, initial_output, recording, logged, alone, tuple(remarks)
     )
-
-
-def _found(
-    cases: Mapping[str, Callable[[], PlannedBound]],
-) -> tuple[list[PlannedBound | None], list[str]]:
-    """The bound of each case, None where it determines nothing, and why not."""
-    found: list[PlannedBound | None] = []
-    remarks = []
-    for label, bound in cases.items():
-        try:
-            found.append(bound())
-        except (NotIdentifiableError, ValueError) as refusal:
-            found.append(None)
-            remarks.append(f"{label}: {refusal}")
-    return found, remarks
 
 
 def _checked_start(initial_output: float | None) -> None:

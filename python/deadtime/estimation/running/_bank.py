@@ -11,6 +11,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.digits import between
+from deadtime._base.plain import plain_fields
 from deadtime._base.validation import interval, non_negative
 from deadtime._base.verdicts import Verdict, claimed, verdict_if
 from deadtime.estimation._native import BankAnswer, FlightPlant
@@ -141,6 +142,9 @@ AT_END = 0.1
 #: White noise so many times the one that was given or fitted is another noise.
 LOUDER = 3.0
 
+#: So many changes within a minute are not those of a delay.
+RESTLESS = 3
+
 #: Share of the range that an interval must be narrower than, to be an estimate.
 NARROWER = 0.5
 
@@ -199,10 +203,7 @@ class OnlineEstimate:
 
     def to_dict(self) -> dict[str, Any]:
         """All numbers, as plain values for JSON."""
-        return {
-            name: list(value) if isinstance(value, tuple) else value
-            for name, value in asdict(self).items()
-        }
+        return plain_fields(asdict(self))
 
     def __str__(self) -> str:
         text = f"{self.time:.2f} s: {self.verdict}"
@@ -233,11 +234,17 @@ def reasons_against(numbers: BankAnswer, white: float, range_: tuple[float, floa
 
 
 def estimate_of(
-    numbers: BankAnswer, white: float, range_: tuple[float, float], doubts: Sequence[str] = ()
+    numbers: BankAnswer,
+    white: float,
+    range_: tuple[float, float],
+    doubts: Sequence[str] = (),
+    changes: int = 0,
 ) -> OnlineEstimate:
-    """The estimate of the kernel's answer."""
+    """The estimate of the kernel's answer, after so many changes in a minute."""
     known = numbers.high - numbers.low < NARROWER * (range_[1] - range_[0])
     against = [*doubts, *reasons_against(numbers, white, range_)]
+    if changes >= RESTLESS:
+        against.append(f"{changes} changes in a minute, so the plant model is incomplete")
     message = "; ".join(f"not reliable: {reason}" for reason in against)
     if not known:
         waits = (

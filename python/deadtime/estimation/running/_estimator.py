@@ -13,7 +13,6 @@ import numpy as np
 import deadtime.estimation.running._bank as bank
 from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.validation import finite, non_negative, positive
-from deadtime._base.verdicts import Verdict
 from deadtime.estimation._estimate import estimate_delay
 from deadtime.estimation._native import BankAnswer, OnlineBank
 from deadtime.estimation._result import DelayEstimate
@@ -33,8 +32,8 @@ LEARN, LAST = 10.0, 30.0
 #: Fewest rows that the noise is learned from.
 FEWEST = 40
 
-#: So many changes within so many seconds are not those of a delay.
-RESTLESS, MINUTE = 3, 60.0
+#: Changes count for so many seconds.
+MINUTE = 60.0
 
 #: After so many seconds in doubt, a change is one of what the plant lacks. A jump of the delay
 #: itself is found sooner; a longer time reports more changes that are none.
@@ -312,18 +311,15 @@ class OnlineEstimator:
 
     def _estimate(self, answer: BankAnswer) -> OnlineEstimate:
         assert self._noise is not None
-        found = bank.estimate_of(answer, self._noise.white, self.delays, self._doubts)
-        if found.changed:
-            self._changes.append(found.time)
-        self._changes = [time for time in self._changes if time > found.time - MINUTE]
-        is_restless = len(self._changes) >= RESTLESS
-        if is_restless:
-            count = len(self._changes)
-            reason = f"not reliable: {count} changes in a minute, so the plant model is incomplete"
-            message = f"{found.message}; {reason}" if found.message else reason
-            verdict: Verdict = "indication" if found.known else "none"
-            found = replace(found, verdict=verdict, message=message)
-        in_doubt = is_restless or found.time - self._doubted_since > IN_DOUBT
+        if answer.changed:
+            self._changes.append(answer.time)
+        self._changes = [time for time in self._changes if time > answer.time - MINUTE]
+        found = bank.estimate_of(
+            answer, self._noise.white, self.delays, self._doubts, changes=len(self._changes)
+        )
+        in_doubt = (
+            len(self._changes) >= bank.RESTLESS or found.time - self._doubted_since > IN_DOUBT
+        )
         # The kernel forgets its doubts at a change: they begin again after the next rows.
         if found.verdict == "indication":
             self._doubted_since = min(self._doubted_since, found.time)

@@ -21,8 +21,7 @@ from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
 #: What a track takes over from its estimates.
-NUMBERS = ("time", "delay", "lag", "delay_plus_lag", "gain")
-MARKS = ("known", "informed", "changed")
+NAMES = ("time", "delay", "lag", "delay_plus_lag", "gain", "known", "informed", "changed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +82,7 @@ class DelayTrack(ReadOnlyArrays):
 
         ends = np.array([estimate.ci for estimate in estimates])
         columns: dict[str, Any] = {
-            name: np.array([getattr(estimate, name) for estimate in estimates], dtype=kind)
-            for names, kind in ((NUMBERS, float), (MARKS, bool))
-            for name in names
+            name: np.array([getattr(estimate, name) for estimate in estimates]) for name in NAMES
         }
         columns["reliable"] = np.array([estimate.verdict == "reliable" for estimate in estimates])
         return cls(low=ends[:, 0], high=ends[:, 1], last=estimates[-1], **columns)
