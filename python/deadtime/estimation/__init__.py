@@ -45,7 +45,7 @@ from deadtime.estimation.evidence._find import refit as refit
 from deadtime.estimation.evidence._found import Cause, PlantCandidate, SensorFault
 from deadtime.estimation.evidence._numbers import FittedRecording, LoopView
 from deadtime.estimation.evidence._question import PLANTS as PLANTS
-from deadtime.estimation.evidence._words import Advice
+from deadtime.estimation.evidence._advice import Advice
 from deadtime.estimation.methods._arx_scan import ARXScan
 from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._decay import Decay

@@ -2,17 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
+from deadtime._base.digits import between, shown
 from deadtime._base.drawing import Axes, Figure, new_figure, shown_rows
 from deadtime._base.notebook import Pictured
 from deadtime._base.plain import plain
-from deadtime.estimation.evidence._found import Cause, SensorFault
+from deadtime._base.verdicts import rough
+from deadtime.estimation.evidence._found import CLEAR, Cause, SensorFault
 from deadtime.estimation.evidence._numbers import FoundPlant
-from deadtime.estimation.evidence._words import Advice, advice_on, headline_of, lines_of, summary_of
+from deadtime.estimation.evidence._advice import Advice, advice_on
+
+#: Ratio of the ends of an interval of the gain below which it is shown for a frequency. Larger:
+#: frequencies that the command hardly moves are listed too.
+KNOWN = 2.0
+
+#: Names of numbers with the words and unit for each.
+NUMBERS = (
+    ("delay", "dead time", "s"),
+    ("gain", "gain", ""),
+    ("lag", "time constant", "s"),
+    ("largest_gain", "largest stable gain", ""),
+    ("crossover", "crossover at half gain", "rad/s"),
+    ("delay_at_crossover", "equivalent delay there", "s"),
+    ("gain_at_crossover", "gain there", ""),
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,7 +106,13 @@ class PlantEstimate(FoundPlant, Pictured):
 
     def headline(self) -> str:
         """The verdict and what it is about, in a line."""
-        return headline_of(self)
+        if self.verdict == "none":
+            return f"none: {self.reason}"
+        plant = self.best.in_words()
+        if self.verdict == "indication":
+            return f"indication: dead time about {rough(self.delay, 's')}, {plant}; {self.reason}"
+        ends, value = _ends(self.ci(), "s"), self._stated("delay", "s")
+        return f"reliable: dead time {value} (95 %: {ends}), {plant}"
 
     def advice(self) -> Advice:
         """What to do next, computed from the recording."""
@@ -94,11 +120,86 @@ class PlantEstimate(FoundPlant, Pictured):
 
     def lines(self) -> list[str]:
         """The summary without what to do next, a line each."""
-        return lines_of(self)
+        lines = [self.headline()]
+        if self.verdict != "none":
+            lines += self._numbers()
+        return [*lines, *self._seen(), *self._beside()]
 
     def summary(self) -> str:
         """The answer as a few lines of text, the verdict first."""
-        return summary_of(self, self._advice)
+        first, *rest = self.lines()
+        advice = self._advice
+        lines = [first, *(f"  {line}" for line in rest), f"next: {advice.words}"]
+        return "\n".join([*lines, f"  {advice.statement}"] if advice.statement else lines)
+
+    def _numbers(self) -> list[str]:
+        """A line a number, with its interval where that is claimed."""
+        lines = []
+        for name, words, unit in NUMBERS:
+            value = self.value(name) if name in self.intervals else math.nan
+            if not math.isfinite(value):
+                continue
+            if self.verdict == "reliable":
+                ends = _ends(self.intervals[name], unit)
+                lines.append(f"{words:<24} {self._stated(name, unit):<14} 95 %: {ends}")
+            else:
+                lines.append(f"{words:<24} about {rough(value, unit)}")
+        omega = self.crossover_in_loop
+        if math.isfinite(omega):
+            lines.append(f"with its controller, the loop has its crossover at {omega:.3g} rad/s")
+        if not math.isfinite(self.largest_gain):
+            lines.append("no proportional gain makes the loop unstable")
+        return lines
+
+    def _seen(self) -> list[str]:
+        """Gain and equivalent delay at frequencies of the command, where no more is determined."""
+        told = self._code in ("too few told", "classes contradict")
+        if not told or not self.excited.size or self.determined < 2:
+            return []
+        view = self.at(self.excited)
+        each = zip(self.excited.tolist(), view.gain_ci.T, view.delay_ci.T, strict=True)
+        return [
+            f"at {omega:.4g} rad/s: gain {_ends(gain)}, equivalent delay {_ends(delay, 's')} (95 "
+            f"%), or this delay plus multiples of half a period, {rough(math.pi / omega, 's')}"
+            for omega, gain, delay in each
+            if gain[1] < KNOWN * gain[0]
+        ]
+
+    def _beside(self) -> list[str]:
+        """What came second, what is clearly better, what was changed, and the noise."""
+        lines = []
+        if self.better is not None:
+            lines.append(
+                f"{self.better.in_words()} explains the recording "
+                f"clearly better: by {-self.better.behind:.3g} in BIC"
+            )
+        for second in self.candidates[1:2] if self.verdict != "none" else ():
+            clear = "clearly behind" if second.behind >= CLEAR else "possible too, but behind"
+            words = second.in_words()
+            lines.append(f"second best: {words}; {clear}, by {second.behind:.3g} in BIC")
+        if self.shift:
+            lines.append(
+                f"in the recording the command is {abs(self.shift)} row "
+                f"{'early' if self.shift > 0 else 'late'}, so the command was shifted"
+            )
+        lines += [f"found: {cause.in_words()}: {cause.remedy}" for cause in self.causes]
+        for fault in self.sensor_faults:
+            done = "found" if fault.name == "smoothed" else "left out"
+            lines.append(f"{done}: {fault.in_words()}")
+        for place, run in enumerate(self.runs, 1):
+            rows = int((~np.isnan(run.residuals)).sum())
+            where = f" of recording {place}" if self.others else ""
+            if rows:
+                lines.append(
+                    f"unexplained: a standard deviation of {run.noise_std:.3g} in {rows} rows, "
+                    f"which are {shown(run.recording.sample_time, 0.0, 's')} apart{where}"
+                )
+        return lines
+
+    def _stated(self, name: str, unit: str) -> str:
+        """A number with the digits that its interval supports."""
+        low, high = self.intervals[name]
+        return shown(self.value(name), 0.25 * (high - low), unit)
 
     def to_dict(self) -> dict[str, Any]:
         """All results but the arrays, as plain values for JSON."""
@@ -165,6 +266,11 @@ class PlantEstimate(FoundPlant, Pictured):
 
     def __repr__(self) -> str:
         return f"<PlantEstimate {self.headline()}>"
+
+
+def _ends(ends: Iterable[float], unit: str = "") -> str:
+    low, high = map(float, ends)
+    return between(low, high, 0.25 * (high - low), unit)
 
 
 def _plain(found: Cause | SensorFault) -> dict[str, Any]:

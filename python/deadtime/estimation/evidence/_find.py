@@ -17,7 +17,7 @@ from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._found import CLEAR, candidate_of, causes_of, sensor_faults_of
 from deadtime.estimation.evidence._numbers import FittedRecording
 from deadtime.estimation.evidence._question import Question, questions_of
-from deadtime.estimation.evidence._words import TAKEN_AT_REST, TOO_EARLY, moves_in, reason_of
+from deadtime.estimation.evidence._advice import TAKEN_AT_REST, TOO_EARLY, moves_in, reason_of
 from deadtime.recordings import Recording
 
 #: Lower and upper end of an interval.

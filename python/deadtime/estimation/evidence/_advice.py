@@ -1,41 +1,24 @@
-"""An estimate in words: verdict, reasons, numbers, what came second, what to do next."""
+"""Why an estimate is not reliable, and what to do next, in words."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 import deadtime.estimation._native as native
-from deadtime._base.digits import between, shown
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import OpenRange
-from deadtime._base.verdicts import rough
-from deadtime.estimation.evidence._found import CLEAR
 from deadtime.estimation.evidence._numbers import FoundPlant
 from deadtime.estimation.evidence._question import Question
 from deadtime.loops import Controller
 from deadtime.recordings import MINIMUM_SAMPLES
 
-#: Ratio of the ends of an interval of the gain below which it is shown for a frequency. Larger:
-#: frequencies that the command hardly moves are listed too.
-KNOWN = 2.0
-
 #: Parts of a window that are tried where a disturbance spoils the whole, as shares of it. More or
 #: finer parts: more of a good stretch is used, and the advice takes longer.
 PARTS = ((0.0, 0.75), (0.25, 1.0), (0.0, 0.5), (0.5, 1.0))
-
-#: Names of numbers with the words and unit for each.
-NUMBERS = (
-    ("delay", "dead time", "s"),
-    ("gain", "gain", ""),
-    ("lag", "time constant", "s"),
-    ("largest_gain", "largest stable gain", ""),
-    ("crossover", "crossover at half gain", "rad/s"),
-    ("delay_at_crossover", "equivalent delay there", "s"),
-    ("gain_at_crossover", "gain there", ""),
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,110 +117,13 @@ def reason_of(code: str, found: native.FamilyFit, is_one_step: bool, step: float
     return sentences.get(code, code)
 
 
-def headline_of(fit: FoundPlant) -> str:
-    """The verdict, the dead time and the plant; without a number where there is none."""
-    if fit.verdict == "none":
-        return f"none: {fit.reason}"
-    plant = fit.best.in_words()
-    if fit.verdict == "indication":
-        return f"indication: dead time about {rough(fit.delay, 's')}, {plant}; {fit.reason}"
-    ends = _ends(fit.ci(), "s")
-    return f"reliable: dead time {_value(fit, 'delay', 's')} (95 %: {ends}), {plant}"
-
-
-def lines_of(fit: FoundPlant) -> list[str]:
-    """Verdict, numbers, what came second: a line each."""
-    lines = [headline_of(fit)]
-    if fit.verdict != "none":
-        lines += _numbers(fit)
-    return [*lines, *_seen(fit), *_beside(fit)]
-
-
-def summary_of(fit: FoundPlant, advice: Advice) -> str:
-    """All lines, and what to do next."""
-    first, *rest = lines_of(fit)
-    lines = [first, *(f"  {line}" for line in rest), f"next: {advice.words}"]
-    return "\n".join([*lines, f"  {advice.statement}"] if advice.statement else lines)
-
-
-def _numbers(fit: FoundPlant) -> list[str]:
-    """A line a number, with its interval where that is claimed."""
-    lines = []
-    for name, words, unit in NUMBERS:
-        value = fit.value(name) if name in fit.intervals else math.nan
-        if not math.isfinite(value):
-            continue
-        if fit.verdict == "reliable":
-            ends = _ends(fit.intervals[name], unit)
-            lines.append(f"{words:<24} {_value(fit, name, unit):<14} 95 %: {ends}")
-        else:
-            lines.append(f"{words:<24} about {rough(value, unit)}")
-    if math.isfinite(fit.crossover_in_loop):
-        lines.append(
-            f"with its controller, the loop has its crossover at {fit.crossover_in_loop:.3g} rad/s"
-        )
-    if not math.isfinite(fit.largest_gain):
-        lines.append("no proportional gain makes the loop unstable")
-    return lines
-
-
-def _seen(fit: FoundPlant) -> list[str]:
-    """Gain and equivalent delay at the frequencies of the command, where no more is determined."""
-    if (
-        fit._code not in ("too few told", "classes contradict")
-        or not fit.excited.size
-        or fit.determined < 2
-    ):
-        return []
-    view = fit.at(fit.excited)
-    return [
-        f"at {omega:.4g} rad/s: gain {_ends(gain)}, equivalent delay {_ends(delay, 's')} (95 "
-        f"%), or this delay plus multiples of half a period, {rough(math.pi / omega, 's')}"
-        for omega, gain, delay in zip(
-            fit.excited.tolist(), view.gain_ci.T, view.delay_ci.T, strict=True
-        )
-        if gain[1] < KNOWN * gain[0]
-    ]
-
-
-def _beside(fit: FoundPlant) -> list[str]:
-    """What came second, what explains the recording better, what was changed, and the noise."""
-    lines = []
-    if fit.better is not None:
-        lines.append(
-            f"{fit.better.in_words()} explains the recording "
-            f"clearly better: by {-fit.better.behind:.3g} in BIC"
-        )
-    for second in fit.candidates[1:2] if fit.verdict != "none" else ():
-        clear = "clearly behind" if second.behind >= CLEAR else "possible too, but behind"
-        lines.append(f"second best: {second.in_words()}; {clear}, by {second.behind:.3g} in BIC")
-    if fit.shift:
-        lines.append(
-            f"in the recording the command is {abs(fit.shift)} row "
-            f"{'early' if fit.shift > 0 else 'late'}, so the command was shifted"
-        )
-    lines += [f"found: {cause.in_words()}: {cause.remedy}" for cause in fit.causes]
-    for fault in fit.sensor_faults:
-        done = "found" if fault.name == "smoothed" else "left out"
-        lines.append(f"{done}: {fault.in_words()}")
-    for place, run in enumerate(fit.runs, 1):
-        rows = int((~_isnan(run.residuals)).sum())
-        where = f" of recording {place}" if fit.others else ""
-        if rows:
-            lines.append(
-                f"unexplained: a standard deviation of {run.noise_std:.3g} in {rows} rows, "
-                f"which are {shown(run.recording.sample_time, 0.0, 's')} apart{where}"
-            )
-    return lines
-
-
 def advice_on(fit: FoundPlant) -> Advice:
     """What to do next, by why the estimate is not reliable."""
-    advice = _advice_on(fit)
+    advice = _advice_on(fit, fit._question.options())
     return replace(advice, asked="recordings") if fit.others else advice
 
 
-def _advice_on(fit: FoundPlant) -> Advice:
+def _advice_on(fit: FoundPlant, given: dict[str, Any]) -> Advice:
     if fit.verdict == "reliable":
         if fit.best.name == "delay":
             return Advice("nothing, because the output is the delayed command")
@@ -246,22 +132,19 @@ def _advice_on(fit: FoundPlant) -> Advice:
             f"design a {kind} controller for the whole interval of the dead time", controller=kind
         )
     if fit._better is not None:
-        return Advice(
-            "leave out the plant, because another kind of plant is more likely",
-            {"plant": None},
-            fit._question.options(),
-        )
+        words = "leave out the plant, because another kind of plant is more likely"
+        return Advice(words, {"plant": None}, given)
     if fit._code == TAKEN_AT_REST or fit.reason == TOO_EARLY:
         words = "if the plant was at rest at the first row, give this information"
-        return Advice(words, {"at_rest": True}, fit._question.options())
-    advice = _advice_by_reason(fit, fit._question.options())
+        return Advice(words, {"at_rest": True}, given)
+    advice = _advice_by_reason(fit, given)
     if advice.options and fit.reason.endswith(TAKEN_AT_REST):
         return replace(advice, options={"at_rest": True, **advice.options})
     return advice
 
 
 def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
-    if fit._code in ("too few told", "classes contradict", "crossover not told"):
+    if fit._code in FEW_NUMBERS:
         known = [plant for plant in fit.candidates if len(plant.parameters) <= fit.determined]
         words = "record again with a command that steps up and down at irregular intervals"
         if known and "plant" not in given:
@@ -302,7 +185,7 @@ def _reliable_part(question: Question) -> OpenRange | None:
 def moves_in(fit: FoundPlant) -> bool:
     """Whether the command changes in the rows that count."""
     for run, question in zip(fit.runs, fit._question.each, strict=True):
-        used = ~_isnan(run.residuals)
+        used = ~np.isnan(run.residuals)
         first = int(used.argmax()) if used.any() else 0
         command = question.command[max(first - 1, 0) :]
         if bool((command != command[0]).any()):
@@ -312,13 +195,3 @@ def moves_in(fit: FoundPlant) -> bool:
 
 def _isnan(values: Any) -> Any:
     return values != values
-
-
-def _value(fit: FoundPlant, name: str, unit: str) -> str:
-    low, high = fit.intervals[name]
-    return shown(fit.value(name), 0.25 * (high - low), unit)
-
-
-def _ends(ends: Iterable[float], unit: str = "") -> str:
-    low, high = map(float, ends)
-    return between(low, high, 0.25 * (high - low), unit)
