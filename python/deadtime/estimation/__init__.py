@@ -40,12 +40,12 @@ from deadtime.estimation._plots import (
 )
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation._shared import SharedNumber, shared_number
+from deadtime.estimation.evidence._advice import Advice
 from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._find import refit as refit
 from deadtime.estimation.evidence._found import Cause, PlantCandidate, SensorFault
 from deadtime.estimation.evidence._numbers import FittedRecording, LoopView
 from deadtime.estimation.evidence._question import PLANTS as PLANTS
-from deadtime.estimation.evidence._advice import Advice
 from deadtime.estimation.methods._arx_scan import ARXScan
 from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._decay import Decay

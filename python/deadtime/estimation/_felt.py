@@ -13,9 +13,9 @@ G is that of the continuous plant with its dead time, without a hold, as in `Pla
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -91,13 +91,13 @@ def highest_excited(recording: Recording, loop: ControlLoop) -> float:
 class Felt(AtCrossover):
     """What a loop feels of the plant of an estimate: part of `DelayEstimate`."""
 
-    if TYPE_CHECKING:
-        loop: ControlLoop
-        free: tuple[str, ...]
-        cov: Array
-        uncalibrated: str
+    loop: ControlLoop
+    free: tuple[str, ...]
+    cov: Array
 
-        def quantile(self, level: float) -> float: ...
+    @abstractmethod
+    def quantile(self, level: float) -> float:
+        """That of Student's distribution that goes with the standard errors at a level."""
 
     @cached_property
     def _limits(self) -> tuple[float, float]:

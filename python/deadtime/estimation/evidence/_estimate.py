@@ -15,9 +15,9 @@ from deadtime._base.drawing import Axes, Figure, new_figure, shown_rows
 from deadtime._base.notebook import Pictured
 from deadtime._base.plain import plain
 from deadtime._base.verdicts import rough
+from deadtime.estimation.evidence._advice import Advice, advice_on
 from deadtime.estimation.evidence._found import CLEAR, Cause, SensorFault
 from deadtime.estimation.evidence._numbers import FoundPlant
-from deadtime.estimation.evidence._advice import Advice, advice_on
 
 #: Ratio of the ends of an interval of the gain below which it is shown for a frequency. Larger:
 #: frequencies that the command hardly moves are listed too.

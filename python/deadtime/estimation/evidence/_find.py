@@ -13,11 +13,11 @@ import numpy as np
 import deadtime.estimation._native as native
 from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import Verdict
+from deadtime.estimation.evidence._advice import TAKEN_AT_REST, TOO_EARLY, moves_in, reason_of
 from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._found import CLEAR, candidate_of, causes_of, sensor_faults_of
 from deadtime.estimation.evidence._numbers import FittedRecording
 from deadtime.estimation.evidence._question import Question, questions_of
-from deadtime.estimation.evidence._advice import TAKEN_AT_REST, TOO_EARLY, moves_in, reason_of
 from deadtime.recordings import Recording
 
 #: Lower and upper end of an interval.
@@ -118,13 +118,11 @@ def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
     """The answer of the kernel as a result."""
     answering = [fit for fit in found.candidates if fit.values[fit.names.index("gain")] != 0.0]
     candidates = tuple(candidate_of(fit, answering[0].bic) for fit in answering)
-    first, best = (answering[0], candidates[0]) if answering else (None, None)
+    first = answering[0] if answering else None
     runs = [_run(part, first, place) for place, part in enumerate(question.each)]
-    numbers: dict[str, Any] = {
-        "delay": math.nan if best is None else best.delay,
-        "plant": None if best is None else best.plant,
-        "parameters": {} if best is None else dict(best.parameters),
-    }
+    numbers: dict[str, Any] = {"delay": math.nan, "plant": None, "parameters": {}}
+    if candidates:
+        numbers = {name: getattr(candidates[0], name) for name in numbers}
     steps = [native.coarse_step(run.recording.output, run.noise_std) for run in runs]
     step = next(filter(None, steps), 0.0)
     verdict = "indication" if step and found.verdict == "reliable" else found.verdict

@@ -109,39 +109,30 @@ def _time(value: float) -> str:
 
 def candidate_of(found: native.FamilyCandidate, best: float) -> PlantCandidate:
     """A candidate of the kernel; `best` is the least BIC."""
-    delay, gain, lags, zero, poles = found.plant_of(found.values.tolist())
-    pair = dict(zip(PAIR, poles or (), strict=False))
-    parameters = {"delay": delay, "gain": gain}
-    parameters |= {f"lag_{place}": lag for place, lag in enumerate(lags, 1)}
-    if found.has_zero:
-        parameters["zero"] = zero
+    plant, parameters = plant_of(found, found.values.tolist())
+    behind = found.bic - best
     return PlantCandidate(
-        found.plant,
-        delay,
-        _plant(gain, tuple(lags), zero, found.integrating, pair),
-        parameters | pair,
-        found.bic - best,
-        found.told,
-        found.noise_std,
+        found.plant, parameters["delay"], plant, parameters, behind, found.told, found.noise_std
     )
 
 
-def plant_of(found: native.FamilyCandidate, values: Sequence[float]) -> tuple[float, Plant]:
-    """The dead time and the plant of a candidate with these values of its numbers."""
+def plant_of(
+    found: native.FamilyCandidate, values: Sequence[float]
+) -> tuple[Plant, dict[str, float]]:
+    """The simplest plant that has these values of the numbers of a candidate, and all of them."""
     delay, gain, lags, zero, poles = found.plant_of(values)
     pair = dict(zip(PAIR, poles or (), strict=False))
-    return max(delay, 0.0), _plant(gain, tuple(lags), zero, found.integrating, pair)
-
-
-def _plant(
-    gain: float, lags: tuple[float, ...], zero: float, integrator: bool, pair: dict[str, float]
-) -> Plant:
-    """The simplest plant of the package that has these numbers."""
-    if not pair and not zero and len(lags) < 2:
-        if integrator:
-            return Integrator(gain, *lags)
-        return FirstOrder(gain, *lags) if lags else RationalPlant([1.0], [1.0], gain)
-    return FactoredPlant(lags, gain, zero, integrator, **pair)
+    parameters = {"delay": delay, "gain": gain}
+    parameters |= {f"lag_{place}": lag for place, lag in enumerate(lags, 1)}
+    parameters |= {"zero": zero} if found.has_zero else {}
+    plant: Plant
+    if pair or zero or len(lags) > 1:
+        plant = FactoredPlant(tuple(lags), gain, zero, found.integrating, **pair)
+    elif found.integrating:
+        plant = Integrator(gain, *lags)
+    else:
+        plant = FirstOrder(gain, *lags) if lags else RationalPlant([1.0], [1.0], gain)
+    return plant, parameters | pair
 
 
 #: Quantile of a 95 % interval.

@@ -347,8 +347,8 @@ class FoundPlant(AtCrossover, ReadOnlyArrays):
         for fit in near or found[:1]:
 
             def number(values: Array, fit: native.FamilyCandidate = fit) -> float:
-                delay, plant = plant_of(fit, values.tolist())
-                return float(of(around.replace(plant=plant, delay=delay)))
+                plant, numbers = plant_of(fit, values.tolist())
+                return float(of(around.replace(plant=plant, delay=max(numbers["delay"], 0.0))))
 
             steps = np.diag(STEP * np.array(fit.errors))
             values, n = np.array(fit.values), len(fit.names)
