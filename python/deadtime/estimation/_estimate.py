@@ -35,7 +35,7 @@ from deadtime.estimation.methods._overshoot import Overshoot
 from deadtime.estimation.methods._relay import Relay
 from deadtime.estimation.methods._waveform import Waveform
 from deadtime.loops import Controller
-from deadtime.recordings import Finding, Recording
+from deadtime.recordings import Finding, Recording, RecordingCheck
 
 #: The methods by name.
 METHODS: Mapping[str, type[Method]] = {
@@ -324,7 +324,7 @@ def checked_run(run: Run) -> Run:
     for finding in check.findings:
         if finding.severity == "refused" and finding.code not in OWN_REFUSALS:
             raise NotIdentifiableError(str(finding))
-    return command_on_its_row(run._replace(check=check))
+    return command_on_its_row(run, check)
 
 
 def automatic_method(recordings: Iterable[Recording]) -> str:
@@ -357,22 +357,19 @@ LEAST_MOVE = 0.25
 OF_THE_LOOP = ("command_differs", "command_gain", "command_offset", "output_range", "rows_repeated")
 
 
-def command_on_its_row(run: Run) -> Run:
+def command_on_its_row(run: Run, check: RecordingCheck) -> Run:
     """The run with its command moved, where it was logged one row late or early.
 
     Commands with times of their own are on no row.
     """
-    assert run.check is not None
-    if run.recording.sent is not None:
-        return run
-    rows = rows_off(run.check)
-    if not rows:
-        return run
+    rows = rows_off(check)
+    if run.recording.sent is not None or not rows:
+        return run._replace(check=check)
     said = (
         f"the command was logged one row {'late' if rows > 0 else 'early'}, as the equation of "
-        f"the controller shows, and was shifted by {shown(run.check.row_time, math.nan, 's')}"
+        f"the controller shows, and was shifted by {shown(check.row_time, math.nan, 's')}"
     )
-    recording = on_its_row(run.recording, run.loop, run.check)
+    recording = on_its_row(run.recording, run.loop, check)
     check = recording.check(run.loop, run.window)
     return run._replace(recording=recording, check=check, corrected=(*run.corrected, said))
 

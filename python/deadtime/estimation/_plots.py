@@ -184,8 +184,8 @@ def _draw_ellipse(ax: Axes, plan: Identifiability) -> None:
     centre = np.array([plan.loop.parameters["delay"], plan.loop.parameters[slow]])
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
     circle = np.stack([np.cos(angle), np.sin(angle)])
-    bounds = (("command logged", plan.command_logged), ("reference only", plan.reference_only))
-    for (label, bound), colour in zip(bounds, COLOURS, strict=False):
+    bounds = {"command logged": plan.command_logged, "reference only": plan.reference_only}
+    for (label, bound), colour in zip(bounds.items(), COLOURS, strict=False):
         if bound is None:
             continue
         places = [bound.free.index("delay"), bound.free.index(slow)]
