@@ -8,7 +8,7 @@ while the loop runs. Each method is a class that holds its options.
 
 # The files. `_estimate` chooses and runs a method, `_compare` runs several, `_choose` tries several
 # plants, `_result` is what they return, `_shared` combines several. `evidence` finds the plant of a
-# recording without a loop. `methods` holds one file a method, `data` what they read from a
+# recording without a loop. `methods` holds the methods, `data` what they read from a
 # recording, `_least_squares` models, profiles and residuals, `_plant` plant and noise as the kernel
 # takes them, `planning` the bounds of planned experiments, `running` what is estimated while a loop
 # runs.
@@ -46,15 +46,13 @@ from deadtime.estimation.evidence._find import refit as refit
 from deadtime.estimation.evidence._found import Cause, PlantCandidate, SensorFault
 from deadtime.estimation.evidence._numbers import FittedRecording, LoopView
 from deadtime.estimation.evidence._question import PLANTS as PLANTS
-from deadtime.estimation.methods._arx_scan import ARXScan
 from deadtime.estimation.methods._cta import CTA
-from deadtime.estimation.methods._decay import Decay
-from deadtime.estimation.methods._decrement import Decrement
+from deadtime.estimation.methods._decay import Decay, Decrement
 from deadtime.estimation.methods._flight_conclusion import unseen_in_words as unseen_in_words
 from deadtime.estimation.methods._frequency import Frequency
-from deadtime.estimation.methods._gcc import GCC
 from deadtime.estimation.methods._graphical import Graphical
 from deadtime.estimation.methods._grid import Grid
+from deadtime.estimation.methods._input_output import GCC, ARXScan
 from deadtime.estimation.methods._method import Method
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._overshoot import (

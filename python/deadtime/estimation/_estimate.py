@@ -21,14 +21,12 @@ from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._find import estimate_by_evidence
 from deadtime.estimation.evidence._question import Between
 from deadtime.estimation.evidence._rival import beside_rivals
-from deadtime.estimation.methods._arx_scan import ARXScan
 from deadtime.estimation.methods._cta import CTA
-from deadtime.estimation.methods._decay import Decay
-from deadtime.estimation.methods._decrement import Decrement
+from deadtime.estimation.methods._decay import Decay, Decrement
 from deadtime.estimation.methods._frequency import Frequency
-from deadtime.estimation.methods._gcc import GCC
 from deadtime.estimation.methods._graphical import Graphical
 from deadtime.estimation.methods._grid import Grid
+from deadtime.estimation.methods._input_output import GCC, ARXScan
 from deadtime.estimation.methods._method import Loops, Method, Recordings, Run, Windows, paired_runs
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._overshoot import Overshoot
