@@ -46,24 +46,22 @@ from deadtime.estimation.evidence._find import refit as refit
 from deadtime.estimation.evidence._found import Cause, PlantCandidate, SensorFault
 from deadtime.estimation.evidence._numbers import FittedRecording, LoopView
 from deadtime.estimation.evidence._question import PLANTS as PLANTS
-from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._decay import Decay, Decrement
 from deadtime.estimation.methods._flight_conclusion import unseen_in_words as unseen_in_words
 from deadtime.estimation.methods._frequency import Frequency
-from deadtime.estimation.methods._graphical import Graphical
-from deadtime.estimation.methods._grid import Grid
 from deadtime.estimation.methods._input_output import GCC, ARXScan
 from deadtime.estimation.methods._method import Method
 from deadtime.estimation.methods._output_error import OutputError
-from deadtime.estimation.methods._overshoot import (
+from deadtime.estimation.methods._relay import Relay
+from deadtime.estimation.methods._step_response import (
+    Graphical,
     Overshoot,
     OvershootMap as OvershootMap,
     damping_ratio,
     dominant_x as dominant_x,
     exact_x as exact_x,
 )
-from deadtime.estimation.methods._relay import Relay
-from deadtime.estimation.methods._waveform import NoisePath as NoisePath, Waveform
+from deadtime.estimation.methods._waveform import CTA, Grid, NoisePath as NoisePath, Waveform
 from deadtime.estimation.planning._identifiability import Identifiability, identifiability
 from deadtime.estimation.planning._monte_carlo import MonteCarlo
 from deadtime.estimation.planning._planned_bound import PlannedBound

@@ -17,7 +17,7 @@ from deadtime.estimation._native import independent_samples
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.evidence._rival import beside_rivals
 from deadtime.estimation.methods._method import paired_runs
-from deadtime.estimation.methods._overshoot import Overshoot, OvershootMap
+from deadtime.estimation.methods._step_response import Overshoot, OvershootMap
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 

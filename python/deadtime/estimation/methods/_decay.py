@@ -1,4 +1,6 @@
-"""Delay from the exponential tail of a step response that does not overshoot.
+"""Delay from the decay of a step response: of its tail, or of its peaks.
+
+`Decay`: the exponential tail of a step response that does not overshoot.
 
 With K Td < 1/e the rightmost root of s (lag s + 1) + K e^(-s Td) = 0 is real, s = -r, and the
 control error decays as e^(-r t). The rate r is fitted to the tail by least squares; then
@@ -11,7 +13,7 @@ mode of the next root, also real, decays faster, but near K Td = 1/e hardly so: 
 contains less of it, and less signal. The standard error is that of r by the delta method. The
 method assumes the gain, an output that ends at the reference, and no disturbance.
 
-Logarithmic decrement: delay and gain from successive peaks and valleys of a step response.
+`Decrement`, logarithmic: delay and gain from successive peaks and valleys of a step response.
 
 Once the other modes have decayed, the step response oscillates as e^(-σt) cos(ω_d t + φ) with the
 rightmost pair s = -σ ± iω_d. Its extremes follow each other after π/ω_d, each e^(-σπ/ω_d) times

@@ -11,7 +11,7 @@ In a closed loop the sensor noise is in the output and, through the controller, 
 Methods that assume that the command causes the output then also find the effect of the output on
 the command.
 
-Generalised cross-correlation of the command and the response of the vehicle.
+`GCC`: generalised cross-correlation of the command and the response of the vehicle.
 
 The response r is the command u, delayed, plus noise, so their correlation over the shift,
 R(m) = sum_k u_k r_{k+m}, peaks at the delay. Knapp & Carter (1976) filter both first: their cross
@@ -26,7 +26,8 @@ negative shifts too: the peak is biased, more so with weaker excitation. Whether
 the output is tested and reported. A step excites few frequencies: weightings that treat all alike
 then amplify noise.
 
-ARX models with every whole number of samples of input delay, as MATLAB's `delayest` fits them.
+`ARXScan`: ARX models with every whole number of samples of input delay, as MATLAB's `delayest` fits
+them.
 
     y_k + a_1 y_{k-1} + … = b_1 u_{k-n} + b_2 u_{k-n-1} + … + e_k
 
@@ -50,16 +51,10 @@ from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
+import deadtime.estimation._native as native
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
-from deadtime.estimation._native import (
-    arx_losses,
-    correlation_coefficient,
-    correlation_peak,
-    feedback_test,
-    held_losses,
-)
 from deadtime.estimation.data._checks import check_even, check_moves
 from deadtime.estimation.data._simulated import SimulatedRecording, commands_over_samples
 from deadtime.estimation.data._step_reading import check_decays, read_ringing
@@ -151,7 +146,7 @@ def feedback_p_value(recording: Recording) -> float:
     command = recording.command
     if command is None:  # it is then computed from the output
         return 0.0
-    found = feedback_test(command, recording.reference, recording.output)
+    found = native.feedback_test(command, recording.reference, recording.output)
     return 1.0 if found is None else float(special.fdtrc(found[1], found[2], found[0]))
 
 
@@ -215,7 +210,7 @@ class GCC(OfOne):
         p_value, least = first_shift(data, "gcc")
         feedback = bool(least)
         gain = float(loop.parameters.get("gain", 1.0))
-        shift, between = correlation_peak(
+        shift, between = native.correlation_peak(
             read.command, np.sign(gain) * read.response, self.weighting, (least, read.longest)
         )
         share = _explained(read, shift)
@@ -246,7 +241,7 @@ def _explained(read: InputOutput, shift: int) -> float:
     from scipy import special
 
     size = read.command.size - shift
-    coefficient, spread = correlation_coefficient(read.command, read.response, shift)
+    coefficient, spread = native.correlation_coefficient(read.command, read.response, shift)
     needed = -float(special.ndtri(LEVEL)) * np.sqrt(max(spread, 0.25) / size)
     if abs(coefficient) < needed:
         raise NotIdentifiableError(
@@ -321,11 +316,13 @@ class ARXScan(OfOne):
                 )
             gain = float(loop.parameters["gain"])
             response = np.sign(gain) * read.response
-            samples, losses, none = held_losses(response, read.command, (least, read.longest))
+            samples, losses, none = native.held_losses(
+                response, read.command, (least, read.longest)
+            )
             numbers, tested, best = 2, 2, float(losses[least:].min())
         else:
             numbers, tested = self.na + self.nb, self.nb
-            losses, best, none = arx_losses(
+            losses, best, none = native.arx_losses(
                 data.output - data.output[0],
                 read.command,
                 (self.na, self.nb),

@@ -19,11 +19,9 @@ from deadtime._base.validation import finite, positive, whole_number
 from deadtime.estimation._estimate import estimate_delay, method_of
 from deadtime.estimation._least_squares import unit_of
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
-from deadtime.estimation.methods._cta import CTA
-from deadtime.estimation.methods._grid import Grid
 from deadtime.estimation.methods._method import Method
 from deadtime.estimation.methods._output_error import OutputError
-from deadtime.estimation.methods._waveform import Waveform
+from deadtime.estimation.methods._waveform import CTA, Grid, Waveform
 from deadtime.estimation.planning._monte_carlo import SLOW, MonteCarlo, Trials, with_sums
 from deadtime.estimation.planning._planned_bound import (
     PlannedBound,
