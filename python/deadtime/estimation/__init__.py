@@ -40,8 +40,7 @@ from deadtime.estimation._plots import (
 )
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation._shared import SharedNumber, shared_number
-from deadtime.estimation.evidence._advice import Advice
-from deadtime.estimation.evidence._estimate import PlantEstimate
+from deadtime.estimation.evidence._estimate import Advice, PlantEstimate
 from deadtime.estimation.evidence._find import refit as refit
 from deadtime.estimation.evidence._found import Cause, PlantCandidate, SensorFault
 from deadtime.estimation.evidence._numbers import FittedRecording, LoopView

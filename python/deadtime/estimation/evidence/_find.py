@@ -13,8 +13,13 @@ import numpy as np
 import deadtime.estimation._native as native
 from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import Verdict
-from deadtime.estimation.evidence._advice import TAKEN_AT_REST, TOO_EARLY, moves_in, reason_of
-from deadtime.estimation.evidence._estimate import PlantEstimate
+from deadtime.estimation.evidence._estimate import (
+    TAKEN_AT_REST,
+    TOO_EARLY,
+    PlantEstimate,
+    moves_in,
+    reason_of,
+)
 from deadtime.estimation.evidence._found import CLEAR, candidate_of, causes_of, sensor_faults_of
 from deadtime.estimation.evidence._numbers import FittedRecording
 from deadtime.estimation.evidence._question import Question, questions_of

@@ -209,7 +209,6 @@ class OnlineEstimator:
         OnlineEstimator
         """
         noise = options.pop("noise", None)
-        fitted = fit.noise if fit.noise is not None else FlightNoise(white=fit.rms)
         error = fit.stderr.get("lag", 0.0)
         if "lags" not in options and fit.lag and error > 0.0 and math.isfinite(error):
             low = max(fit.lag - AROUND * error, 0.1 * fit.lag)
@@ -226,10 +225,7 @@ class OnlineEstimator:
                 for (lags, zero, flat), weight in zip(found._settings.layers, prior, strict=True)
             ]
             found._settings = found._settings._replace(layers=layers)
-        found._settings = found._settings._replace(freedom=_freedom_of(fit))
-        if fit.verdict != "reliable":
-            found._doubts = (f"the initial fit of the estimator was not reliable ({fit.message})",)
-        found._begin(fitted if noise is None else _flight_noise(noise))
+        found._begin_after(fit, "the initial fit of the estimator", noise)
         return found
 
     @property
@@ -331,6 +327,15 @@ class OnlineEstimator:
         self._bank = OnlineBank(self._settings.under(noise))
         self._noise = noise
 
+    def _begin_after(self, fit: DelayEstimate, what: str, noise: Noise | None = None) -> None:
+        """Begin with the noise of a fit, or with one that was given."""
+        freedom = min(MOST_FITTED, float(fit.residuals.size))
+        self._settings = self._settings._replace(freedom=freedom)
+        if fit.verdict != "reliable":
+            self._doubts = (f"{what} was not reliable ({fit.message})",)
+        fitted = FlightNoise(white=fit.rms) if fit.noise is None else fit.noise
+        self._begin(fitted if noise is None else _flight_noise(noise))
+
     def _learn(self, time: float, output: float | None, command: float | None) -> OnlineEstimate:
         """Keep a row until the noise is known; then go over all that were kept."""
         if self._rows and time <= self._rows[-1][0]:
@@ -378,11 +383,7 @@ class OnlineEstimator:
 
     def _replay(self, fit: DelayEstimate) -> OnlineEstimate:
         """Begin with the noise of a fit, and give the bank what was kept."""
-        noise = fit.noise if fit.noise is not None else FlightNoise(white=fit.rms)
-        self._settings = self._settings._replace(freedom=_freedom_of(fit))
-        if fit.verdict != "reliable":
-            self._doubts = (f"the fit of the first {LAST:.0f} s was not reliable ({fit.message})",)
-        self._begin(noise)
+        self._begin_after(fit, f"the fit of the first {LAST:.0f} s")
         assert self._bank is not None
         for time, output in self._rows:
             while self._commands and self._commands[0][0] < time:
@@ -392,11 +393,6 @@ class OnlineEstimator:
             self._bank.command(*self._commands.popleft())
         self._rows.clear()
         return self._estimate(answer)
-
-
-def _freedom_of(fit: DelayEstimate) -> float:
-    """Rows that count for the deviation of the noise of a fit."""
-    return min(MOST_FITTED, float(fit.residuals.size))
 
 
 def _flight_noise(noise: Noise) -> FlightNoise:
