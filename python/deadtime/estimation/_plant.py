@@ -11,35 +11,28 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+import deadtime.loops as loops
 from deadtime._base.arrays import Array
 from deadtime.estimation._native import FlightPlant, whitened_columns
 from deadtime.experiments import FlightNoise
-from deadtime.loops import (
-    PAIR,
-    FactoredPlant,
-    FirstOrder,
-    Integrator,
-    ParametricPlant,
-    Plant,
-    RateLimited,
-)
+from deadtime.loops import Plant
 
 
 def behind_limits(plant: Plant) -> Plant:
     """The plant after its limits of the rate of its command, if it has some."""
-    return plant.plant if isinstance(plant, RateLimited) else plant
+    return plant.plant if isinstance(plant, loops.RateLimited) else plant
 
 
 def names_in_kernel(plant: Plant) -> tuple[str, ...]:
     """The numbers of a loop with this plant that the kernel fits."""
     plant = behind_limits(plant)
     own: tuple[str, ...] = ()
-    if isinstance(plant, Integrator):
+    if isinstance(plant, loops.Integrator):
         own = ("lag",)
-    elif isinstance(plant, FirstOrder):
+    elif isinstance(plant, loops.FirstOrder):
         own = ("time_constant",)
-    elif isinstance(plant, FactoredPlant):
-        own = tuple(name for name in plant.parameters if name not in PAIR)
+    elif isinstance(plant, loops.FactoredPlant):
+        own = tuple(name for name in plant.parameters if name not in loops.PAIR)
     return ("delay", "gain", *own)
 
 
@@ -52,15 +45,15 @@ def plant_model(plant: Plant, names: tuple[str, ...], air_behind_lags: bool = Fa
     zero = own_lag = 0.0
     lags: dict[str, float] = {}
     num: Any = [1.0]
-    if isinstance(plant, Integrator):
+    if isinstance(plant, loops.Integrator):
         den, lags = [1.0, 0.0], {"lag": plant.lag} if "lag" in names or plant.lag else {}
-    elif isinstance(plant, FirstOrder):
+    elif isinstance(plant, loops.FirstOrder):
         den, lags = [1.0], {"time_constant": plant.time_constant}
     else:
         num, den = plant._polynomials({**plant.parameters, "gain": 1.0})
-        if isinstance(plant, (FactoredPlant, ParametricPlant)):
+        if isinstance(plant, (loops.FactoredPlant, loops.ParametricPlant)):
             own_lag = plant.lag
-        if isinstance(plant, FactoredPlant):
+        if isinstance(plant, loops.FactoredPlant):
             every = plant.parameters.items()
             found = {name: lag for name, lag in every if name.startswith("lag")}
             found = {name: lag for name, lag in found.items() if lag or name in names}

@@ -7,15 +7,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from deadtime._base.drawing import (
-    COLOURS,
-    DATA,
-    REFERENCE,
-    Axes,
-    Figure,
-    bare_axes,
-    check_matplotlib,
-)
+import deadtime._base.drawing as drawing
+from deadtime._base.drawing import REFERENCE, Axes, Figure
 from deadtime.estimation._result import DelayEstimate, FittedRun
 from deadtime.recordings import Recording
 
@@ -32,7 +25,7 @@ def plot_fits(
 ) -> Axes:
     """Draw the recorded output with the fitted ones over it."""
     _draw_recorded(ax, recording)
-    for colour, (label, fit) in zip(COLOURS, fits.items(), strict=False):
+    for colour, (label, fit) in zip(drawing.COLOURS, fits.items(), strict=False):
         window = fit.recording
         ax.plot(window.time, window.output - fit.residuals, color=colour, lw=1.6, label=label)
     ax.set(xlabel="time / s", ylabel=f"output / {unit}")
@@ -76,12 +69,12 @@ def _check_axes(axes: Sequence[Axes], count: int) -> None:
     if len(axes) != count:
         raise ValueError(f"ax has {len(axes)} axes: give {count} matplotlib axes")
     for ax in axes:
-        bare_axes(ax)
+        drawing.bare_axes(ax)
 
 
 def shown_figure(width: float, height: float) -> Figure:
     """A new figure of pyplot."""
-    check_matplotlib()
+    drawing.check_matplotlib()
     from matplotlib import pyplot
 
     return pyplot.figure(figsize=(width, height), layout="constrained")
@@ -89,7 +82,7 @@ def shown_figure(width: float, height: float) -> Figure:
 
 def _draw_recorded(ax: Axes, recording: Recording) -> None:
     ax.step(recording.time, recording.reference, where="post", label="reference", **REFERENCE)
-    ax.plot(recording.time, recording.output, label="recorded", **DATA)
+    ax.plot(recording.time, recording.output, label="recorded", **drawing.DATA)
 
 
 def _has_profile(fit: DelayEstimate) -> bool:
@@ -100,8 +93,8 @@ def _plot_run(upper: Axes, lower: Axes, run: FittedRun, label: str) -> None:
     recording = run.recording
     _draw_recorded(upper, recording)
     fitted = recording.output - run.residuals
-    upper.plot(recording.time, fitted, color=COLOURS[0], lw=1.6, label=label)
-    lower.plot(recording.time, run.residuals, **DATA)
+    upper.plot(recording.time, fitted, color=drawing.COLOURS[0], lw=1.6, label=label)
+    lower.plot(recording.time, run.residuals, **drawing.DATA)
     lower.axhline(0.0, color="0.6", lw=0.8)
     lower.set(xlabel="time / s")
 
@@ -109,10 +102,10 @@ def _plot_run(upper: Axes, lower: Axes, run: FittedRun, label: str) -> None:
 def _plot_profile(ax: Axes, fit: DelayEstimate) -> None:
     """The profile t over the delay, with the 95 % interval where it crosses 1.96."""
     values, t = fit.profile("delay")
-    ax.plot(values, t, color=COLOURS[0], lw=1.6)
+    ax.plot(values, t, color=drawing.COLOURS[0], lw=1.6)
     for end in fit.ci(0.95):
         ax.axvline(end, **REFERENCE)
-    ax.axvline(fit.delay, color=COLOURS[1], lw=1.0)
+    ax.axvline(fit.delay, color=drawing.COLOURS[1], lw=1.0)
     ax.axhline(1.96, color="0.6", lw=0.8, ls=":")
     ax.set(xlabel="delay / s", ylabel="t", ylim=(0.0, None), title="profile, and 95 % interval")
     ax.title.set_fontsize("small")
@@ -155,7 +148,7 @@ def _draw_recording(ax: Axes, plan: Identifiability) -> None:
 def _draw_slopes(ax: Axes, plan: Identifiability) -> None:
     """Effect of an error as large as the bound; similar curves are hard to tell apart."""
     bound = plan.bound
-    for name, colour in zip(plan.free, COLOURS, strict=False):
+    for name, colour in zip(plan.free, drawing.COLOURS, strict=False):
         moved = bound.sensitivities[name] * bound.stderr[name] / bound.noise.white
         ax.plot(plan.recording.time, moved, color=colour, lw=1.2, label=_with_error(bound, name))
     ax.set(xlabel="time (s)", ylabel="change of the output\nin units of the white noise")
@@ -185,7 +178,7 @@ def _draw_ellipse(ax: Axes, plan: Identifiability) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
     circle = np.stack([np.cos(angle), np.sin(angle)])
     bounds = {"command logged": plan.command_logged, "reference only": plan.reference_only}
-    for (label, bound), colour in zip(bounds.items(), COLOURS, strict=False):
+    for (label, bound), colour in zip(bounds.items(), drawing.COLOURS, strict=False):
         if bound is None:
             continue
         places = [bound.free.index("delay"), bound.free.index(slow)]

@@ -11,15 +11,10 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 
 import deadtime.estimation._native as native
+import deadtime.estimation.evidence._estimate as evidence
 from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import Verdict
-from deadtime.estimation.evidence._estimate import (
-    TAKEN_AT_REST,
-    TOO_EARLY,
-    PlantEstimate,
-    moves_in,
-    reason_of,
-)
+from deadtime.estimation.evidence._estimate import TAKEN_AT_REST, PlantEstimate
 from deadtime.estimation.evidence._found import CLEAR, candidate_of, causes_of, sensor_faults_of
 from deadtime.estimation.evidence._numbers import FittedRecording
 from deadtime.estimation.evidence._question import Question, questions_of
@@ -40,10 +35,10 @@ def estimate_by_evidence(
     found = question.answer(progress=progress)
     first = estimate_of(question, found)
     moves_at_all = any(np.ptp(part.command) > 0.0 for part in question.each)
-    if first.at_rest or moves_in(first) or not moves_at_all:
+    if first.at_rest or evidence.moves_in(first) or not moves_at_all:
         return _beside_all(first, found)
     if question.at_rest is False:
-        return replace(first, verdict="none", reason=TOO_EARLY)
+        return replace(first, verdict="none", reason=evidence.TOO_EARLY)
     question = replace(question, at_rest=True)
     found = question.answer()
     return _taken_at_rest(_beside_all(estimate_of(question, found), found))
@@ -133,7 +128,7 @@ def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
     verdict = "indication" if step and found.verdict == "reliable" else found.verdict
     return PlantEstimate(
         verdict=cast(Verdict, verdict),
-        reason=reason_of(found.reason, found, _is_one_step(question), step),
+        reason=evidence.reason_of(found.reason, found, _is_one_step(question), step),
         **numbers,
         **found.shown,
         candidates=candidates,

@@ -24,19 +24,12 @@ from typing import Any, ClassVar, NamedTuple, TypeAlias
 import numpy as np
 
 import deadtime.estimation._least_squares as least_squares
+import deadtime.estimation._result as result
 import deadtime.estimation.data._checks as checks
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import OpenRange, finite, open_interval
 from deadtime._base.verdicts import Verdict, verdict_if
-from deadtime.estimation._result import (
-    ADVICE,
-    REASONS,
-    CramerRaoBound,
-    DelayEstimate,
-    FittedRun,
-    of_runs,
-)
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.evidence._question import given_recordings, one_each
 from deadtime.experiments import FlightNoise
@@ -114,7 +107,7 @@ class Method(ABC):
     limits: ClassVar[str] = ""
 
     @abstractmethod
-    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> result.DelayEstimate:
         """Fit `free` to the runs; to exactly one unless the method is `joint`."""
 
 
@@ -134,7 +127,7 @@ def check_initial_output(value: float | None) -> None:
 FEW = 12
 
 #: What a message says of residuals that are not white.
-COLOURED = f"{REASONS}the residuals are not white"
+COLOURED = f"{result.REASONS}the residuals are not white"
 
 #: A lag within so many standard errors of zero may be zero. The statistic of the delay is then no
 #: chi-square of one degree of freedom, but at most an even mixture of those with one and two (Self
@@ -154,7 +147,7 @@ def concluded(
     *,
     message: str,
     details: Mapping[str, Any],
-) -> DelayEstimate:
+) -> result.DelayEstimate:
     """Make the estimate of a minimum.
 
     Parameters
@@ -188,16 +181,16 @@ def concluded(
     freedom = residuals.size - len(loose)
     reason = _why_profile(values, residuals.size, count)
     runs = tuple(
-        FittedRun(part.recording, _with(part.loop, values), -misfit)
+        result.FittedRun(part.recording, _with(part.loop, values), -misfit)
         for part, misfit in zip(fitted, _misfits(model, found), strict=True)
     )
-    return DelayEstimate(
-        **of_runs(runs),
+    return result.DelayEstimate(
+        **result.of_runs(runs),
         method=method,
         free=names,
         stderr=errors,
         cov=spread[:count, :count],
-        crb=CramerRaoBound(labels, FlightNoise(math.sqrt(found.cost / freedom)), plain),
+        crb=result.CramerRaoBound(labels, FlightNoise(math.sqrt(found.cost / freedom)), plain),
         whiteness=whiteness,
         verdict=verdict_if(reliable),
         message=_message(message, held, reason, reliable, advice(names, runs[0].loop)),
@@ -281,8 +274,8 @@ def advice(names: Sequence[str], loop: ControlLoop) -> str:
     """Advice for an estimate that is an indication."""
     slow = [name for name in ("lag", "time_constant") if name in loop.parameters]
     if slow and slow[0] not in names:
-        return f"{ADVICE}free=('delay', 'gain', '{slow[0]}'))"
-    return f"{ADVICE}a window around one step, a smaller step, or another plant)"
+        return f"{result.ADVICE}free=('delay', 'gain', '{slow[0]}'))"
+    return f"{result.ADVICE}a window around one step, a smaller step, or another plant)"
 
 
 def _message(done: str, held: list[str], reason: str, reliable: bool, advice: str) -> str:
@@ -334,7 +327,7 @@ class Read(NamedTuple):
     details: Mapping[str, Any]
     recording: Recording | None = None
     residuals: Array | None = None
-    crb: CramerRaoBound | None = None
+    crb: result.CramerRaoBound | None = None
     verdict: Verdict | None = None
     profile: least_squares.Profile | None = None
 
@@ -355,7 +348,7 @@ class OfOne(Method):
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from one recording."""
 
-    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> result.DelayEstimate:
         """Read `free` from the one recording."""
         (run,) = runs
         found = self.read(run, self.names(free, run.loop))
@@ -368,7 +361,7 @@ class OfOne(Method):
             cov = np.full((len(names), len(names)), cov**2)
         whiteness = least_squares.whiteness_of(residuals, len(names))
         passes = whiteness.white or is_rounding(residuals, recording)
-        return DelayEstimate(
+        return result.DelayEstimate(
             method=self.name,
             loop=run.loop.replace(**found.values),
             free=names,

@@ -19,21 +19,13 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import deadtime.estimation._native as native
 import deadtime.estimation.methods._commanded_model as commanded
 import deadtime.estimation.methods._flight_conclusion as flight
+import deadtime.estimation.methods._method as base
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._least_squares import Minimum, Model, solve_jointly, without_vanishing
 from deadtime.estimation._plant import names_in_kernel, plant_model
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
 from deadtime.estimation.methods._flight_conclusion import Adequacy, adequacy_of
-from deadtime.estimation.methods._method import (
-    Method,
-    Run,
-    check_choice,
-    check_fit,
-    check_initial_output,
-    concluded,
-    is_exact,
-)
 from deadtime.loops import ControlLoop
 
 #: Residuals of a first fit below which, as a share of the range of the output, all may be rounding.
@@ -41,7 +33,7 @@ NEARLY_EXACT = 1e-4
 
 
 @dataclass(frozen=True)
-class OutputError(Method):
+class OutputError(base.Method):
     """Least squares on the response of the vehicle to the command as it was logged.
 
     Parameters
@@ -90,12 +82,12 @@ class OutputError(Method):
     joint: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        check_initial_output(self.initial_output)
-        check_choice("air", self.air, ("command", "vehicle"))
-        check_choice("intervals", self.intervals, ("all", "sum"))
+        base.check_initial_output(self.initial_output)
+        base.check_choice("air", self.air, ("command", "vehicle"))
+        base.check_choice("intervals", self.intervals, ("all", "sum"))
         commanded.known_filter(self.output_filter)
 
-    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+    def estimate(self, runs: Sequence[base.Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the response of the plant to the logged commands."""
         known = commanded.known_filter(self.output_filter)
         integrating = (plant_model(run.loop.plant, ()).integrates for run in runs)
@@ -111,7 +103,7 @@ class OutputError(Method):
 
 
 def estimate_from_commands(
-    method: str, runs: Sequence[Run], free: Sequence[str], assumed: commanded.Assumed
+    method: str, runs: Sequence[base.Run], free: Sequence[str], assumed: commanded.Assumed
 ) -> DelayEstimate:
     """Fit the response to the command: logged, or computed from the recorded output.
 
@@ -138,7 +130,7 @@ def _criterion(estimate: DelayEstimate) -> float:
 
 
 def _estimated(
-    method: str, runs: Sequence[Run], free: Sequence[str], assumed: commanded.Assumed
+    method: str, runs: Sequence[base.Run], free: Sequence[str], assumed: commanded.Assumed
 ) -> DelayEstimate:
     """The estimate in stages: commands, least squares, noise, intervals, tests."""
     names = _Names.of(free, runs[0].loop)
@@ -199,7 +191,7 @@ class _Begun:
     """
 
     method: str
-    runs: Sequence[Run]
+    runs: Sequence[base.Run]
     names: _Names
     assumed: commanded.Assumed
     models: list[commanded.CommandedModel]
@@ -213,10 +205,10 @@ class _Begun:
         return self.whole.criterion + 2.0 * sum(model.commands.unknown for model in self.models)
 
     @property
-    def fitted(self) -> list[Run]:
+    def fitted(self) -> list[base.Run]:
         """The recordings as they are fitted."""
         pairs = zip(self.models, self.runs, strict=True)
-        return [Run(model.recording, run.loop) for model, run in pairs]
+        return [base.Run(model.recording, run.loop) for model, run in pairs]
 
     @property
     def message(self) -> str:
@@ -252,14 +244,16 @@ class _Begun:
     def is_exact(self) -> bool:
         """Whether least squares leaves rounding alone."""
         nearly = self.names.are_common and self.whole.leaves_less_than(NEARLY_EXACT)
-        return nearly and is_exact(*self.plain, self.fitted)
+        return nearly and base.is_exact(*self.plain, self.fitted)
 
     def by_least_squares(self) -> DelayEstimate:
         """The estimate of least squares."""
         model, found = self.plain
         start = [*found.point[len(self.names.common) :], math.nan][0]
         details, message = self.details(float(start)), f"least squares {self.message}"
-        return concluded(self.method, model, found, self.fitted, message=message, details=details)
+        return base.concluded(
+            self.method, model, found, self.fitted, message=message, details=details
+        )
 
 
 class _Likeliest(NamedTuple):
@@ -267,7 +261,7 @@ class _Likeliest(NamedTuple):
 
     profile: native.FlightProfile
     doubts: tuple[str, ...]
-    fitted: list[Run]
+    fitted: list[base.Run]
 
 
 def _likeliest(begun: _Begun) -> _Likeliest:
@@ -307,7 +301,7 @@ def _check_delay(begun: _Begun, profile: native.FlightProfile) -> None:
             "to this command. Check columns and units, or choose a longer window"
         )
     if not flight.gain_is_certain(profile):
-        check_fit(*begun.plain, begun.fitted)
+        base.check_fit(*begun.plain, begun.fitted)
 
 
 def _without_the_plant(
@@ -342,7 +336,9 @@ def _concluded(begun: _Begun, found: _Likeliest, adequacy: Adequacy) -> DelayEst
     return estimate
 
 
-def _begun(method: str, runs: Sequence[Run], names: _Names, assumed: commanded.Assumed) -> _Begun:
+def _begun(
+    method: str, runs: Sequence[base.Run], names: _Names, assumed: commanded.Assumed
+) -> _Begun:
     """Least squares on recordings, with gaps in their commands or without if that is likelier."""
     begun = _begun_with(method, runs, names, assumed)
     if any(model.commands.lost for model in begun.models):
@@ -352,7 +348,7 @@ def _begun(method: str, runs: Sequence[Run], names: _Names, assumed: commanded.A
 
 
 def _begun_with(
-    method: str, runs: Sequence[Run], names: _Names, assumed: commanded.Assumed
+    method: str, runs: Sequence[base.Run], names: _Names, assumed: commanded.Assumed
 ) -> _Begun:
     """Least squares on recordings whose commands are as `assumed`."""
     models = [commanded.commanded_model(run, names.common, assumed) for run in runs]
@@ -395,7 +391,7 @@ def _given(
     return plant_model(plant, names.linear, assumed.air == "vehicle"), within
 
 
-def on_regular_times(run: Run) -> Run | None:
+def on_regular_times(run: base.Run) -> base.Run | None:
     """The run with the regular times that its stamps scatter around; None where there are none."""
     check, sample_time, recording = run.check, run.loop.sample_time, run.recording
     if check is None or check.stamps != "jittered":

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+import deadtime.estimation.planning._planned_bound as planned
 from deadtime._base.digits import stated
 from deadtime._base.drawing import Axes, Figure, empty_figure
 from deadtime._base.errors import NotIdentifiableError
@@ -23,11 +24,7 @@ from deadtime.estimation.methods._method import Method
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._waveform import CTA, Grid, Waveform
 from deadtime.estimation.planning._monte_carlo import SLOW, MonteCarlo, Trials, with_sums
-from deadtime.estimation.planning._planned_bound import (
-    PlannedBound,
-    bound_with_command,
-    bound_with_reference,
-)
+from deadtime.estimation.planning._planned_bound import PlannedBound
 from deadtime.experiments import Experiment, FlightNoise, NoiseModel
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
@@ -342,8 +339,8 @@ def identifiability(
             remarks.append(f"{label}: {refusal}")
         return None
 
-    logged = found("command logged", bound_with_command, recordings)
-    alone = found("reference only", bound_with_reference, experiment, recording)
+    logged = found("command logged", planned.bound_with_command, recordings)
+    alone = found("reference only", planned.bound_with_reference, experiment, recording)
     if logged is None and (alone is None or run_loop.is_sampled):
         raise NotIdentifiableError("; ".join(remarks))
     return Identifiability(
