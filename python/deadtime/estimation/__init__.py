@@ -45,13 +45,12 @@ from deadtime.estimation.evidence._find import refit as refit
 from deadtime.estimation.evidence._found import Cause, PlantCandidate, SensorFault
 from deadtime.estimation.evidence._numbers import FittedRecording, LoopView
 from deadtime.estimation.evidence._question import PLANTS as PLANTS
-from deadtime.estimation.methods._decay import Decay, Decrement
 from deadtime.estimation.methods._flight_conclusion import unseen_in_words as unseen_in_words
 from deadtime.estimation.methods._frequency import Frequency
 from deadtime.estimation.methods._input_output import GCC, ARXScan
 from deadtime.estimation.methods._method import Method
+from deadtime.estimation.methods._oscillation import Decay, Decrement, Relay
 from deadtime.estimation.methods._output_error import OutputError
-from deadtime.estimation.methods._relay import Relay
 from deadtime.estimation.methods._step_response import (
     Graphical,
     Overshoot,

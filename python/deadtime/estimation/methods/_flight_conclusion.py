@@ -18,7 +18,6 @@ from deadtime._base.digits import stated
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.verdicts import verdict_if
 from deadtime.estimation._least_squares import JointModel, Model, Profile, Whiteness, places_of
-from deadtime.estimation._native import FlightFinding, FlightProfile
 from deadtime.estimation._result import REASONS, CramerRaoBound, DelayEstimate, FittedRun, of_runs
 from deadtime.estimation.data._checks import LEAST_GAIN, standard_errors
 from deadtime.estimation.methods._commanded_model import CommandedModel
@@ -87,7 +86,7 @@ class Adequacy:
     coloured: bool = False
 
 
-def adequacy_of(profile: FlightProfile) -> Adequacy:
+def adequacy_of(profile: native.FlightProfile) -> Adequacy:
     """Test a fit."""
     found = profile.judge()
     against = [finding for finding in found.findings if finding.is_against]
@@ -106,7 +105,7 @@ def unseen_in_words(lag: float) -> str:
     return f"a further lag below {lag:.2g} s would not"
 
 
-def _in_words(found: FlightFinding, profile: FlightProfile) -> str:
+def _in_words(found: native.FlightFinding, profile: native.FlightProfile) -> str:
     several = found.run is not None and len(profile.fit.numbers.noise) > 1
     pairs = list(zip(found.sizes[::2], found.sizes[1::2], strict=False))
     total = next((name for name in dict(profile.stderr) if name.startswith("delay+")), "")

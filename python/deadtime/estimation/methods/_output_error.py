@@ -25,7 +25,6 @@ from deadtime.estimation._least_squares import Minimum, Model, solve_jointly, wi
 from deadtime.estimation._plant import names_in_kernel, plant_model
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
-from deadtime.estimation.methods._flight_conclusion import Adequacy, adequacy_of
 from deadtime.loops import ControlLoop
 
 #: Residuals of a first fit below which, as a share of the range of the output, all may be rounding.
@@ -139,7 +138,7 @@ def _estimated(
         return begun.by_least_squares()
     found = _likeliest(begun)
     _check_delay(begun, found.profile)
-    adequacy = adequacy_of(found.profile)
+    adequacy = flight.adequacy_of(found.profile)
     adequacy = replace(adequacy, reasons=(*found.doubts, *adequacy.reasons))
     without = _without_the_plant(begun, found.profile, adequacy)
     return without or _concluded(begun, found, adequacy)
@@ -305,7 +304,7 @@ def _check_delay(begun: _Begun, profile: native.FlightProfile) -> None:
 
 
 def _without_the_plant(
-    begun: _Begun, profile: native.FlightProfile, adequacy: Adequacy
+    begun: _Begun, profile: native.FlightProfile, adequacy: flight.Adequacy
 ) -> DelayEstimate | None:
     """The estimate of least squares where the noise stands for what the plant lacks."""
     astray = adequacy.reasons and profile.fit.explains_less(begun.whole)
@@ -320,7 +319,7 @@ def _without_the_plant(
     return None
 
 
-def _concluded(begun: _Begun, found: _Likeliest, adequacy: Adequacy) -> DelayEstimate:
+def _concluded(begun: _Begun, found: _Likeliest, adequacy: flight.Adequacy) -> DelayEstimate:
     """The estimate of the likelihood; of rounded rows alone, with each as an interval."""
     profile, message = found.profile, f"maximum likelihood {begun.message}"
     if adequacy.coloured:
