@@ -4,7 +4,6 @@ from deadtime._deadtime import (
     LEVEL_OF_TESTS as LEVEL_OF_TESTS,
     LONGEST_DELAY as LONGEST_DELAY,
     MOST_NUMBERS as MOST_NUMBERS,
-    SHORTEST_LAG as SHORTEST_LAG,
     BankAnswer as BankAnswer,
     ChebyshevMisfit as ChebyshevMisfit,
     CommandedMisfit as CommandedMisfit,

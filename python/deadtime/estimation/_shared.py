@@ -148,7 +148,6 @@ def shared_number(
         )
     confidence(level)
     ends = [fit.ci(level, name) for fit in estimates]
-    values = [fit._value(name) for fit in estimates]
 
     def total(value: float) -> float:
         return math.fsum(float(fit.profile(name, [value])[1][0]) ** 2 for fit in estimates)
@@ -166,7 +165,7 @@ def shared_number(
         value=best,
         interval=interval,
         level=level,
-        estimates=tuple(values),
+        estimates=tuple(fit._value(name) for fit in estimates),
         p_value=p_value,
         verdict=verdict_if(
             p_value >= native.LEVEL_OF_TESTS and all(fit.verdict == "reliable" for fit in estimates)

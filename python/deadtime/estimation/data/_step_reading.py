@@ -117,17 +117,18 @@ def read_step(recording: Recording) -> StepReading:
             f"before the step from {step.before:g} to {step.after:g} the output is "
             f"{start:g}, so the loop was not at rest: choose a window that begins at rest"
         )
-    travelled = (after - start) / size
     since = recording.time[step.index :] - step.time
-    tail = travelled[-max(4, travelled.size // 4) :]
-    if float(np.mean(tail)) < FOLLOWS:
+    noise = _noise(before, after[-max(4, after.size // 4) :]) / abs(size)
+    travelled = (after - start) / size
+    reading = StepReading(step, start, before.size, size, noise, since, travelled)
+    ended = float(np.mean(reading.tail))
+    if ended < FOLLOWS:
         raise NotIdentifiableError(
-            f"the output ends at {100 * float(np.mean(tail)):.3g} % of the "
+            f"the output ends at {100 * ended:.3g} % of the "
             f"step at {step.time:g} s, so it does not follow the "
             "reference: check columns and units, or choose a longer window"
         )
-    noise = _noise(before, after[-max(4, after.size // 4) :]) / abs(size)
-    return StepReading(step, start, before.size, size, noise, since, travelled)
+    return reading
 
 
 def _noise(before: Array, tail: Array) -> float:

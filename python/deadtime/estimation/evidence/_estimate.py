@@ -64,15 +64,17 @@ class Advice(ReadOnlyArrays):
     def statement(self) -> str:
         """The line of Python that does it; empty where another recording is needed."""
         if self.options:
-            named = {**self.given, **self.options}
-            asked = "".join(
-                f", {name}={_python(value)}" for name, value in named.items() if value is not None
-            )
-            return f"dtm.estimate_delay({self.asked}{asked})"
+            return call_with({**self.given, **self.options}, self.asked)
         if self.controller:
             kind, gains = f"dtm.{self.controller}", ", ".join(["1.0"] * len(self.controller))
             return f"dtm.design(fit.loop({kind}({gains})), controller={kind}, delay=fit.ci())"
         return "fit.plot()" if self.draw else ""
+
+
+def call_with(given: Mapping[str, Any], asked: str = "recording") -> str:
+    """The call that estimates without a loop, with what is given."""
+    named = [f", {name}={_python(value)}" for name, value in given.items() if value is not None]
+    return f"dtm.estimate_delay({asked}{''.join(named)})"
 
 
 def _python(value: Any) -> str:

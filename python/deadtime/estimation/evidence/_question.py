@@ -155,10 +155,8 @@ class Question(ReadOnlyArrays):
             found[name] = own[0] if own.count(own[0]) == len(own) else own
         for name in ("limit", "at_rest", "largest_delay", "integrates", "plant"):
             found[name] = getattr(self, name)
-        if self.hold:
-            found["hold"] = self.hold
-        if self.between != "undecided":
-            found["between"] = self.between
+        found["hold"] = self.hold or None
+        found["between"] = None if self.between == "undecided" else self.between
         if self.controller is None and self.closed_loop != shows_controller(self.recording):
             found["closed_loop"] = self.closed_loop
         return {name: value for name, value in found.items() if value is not None}

@@ -26,6 +26,7 @@ from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import rough
 from deadtime.estimation._result import DelayEstimate, bic
 from deadtime.estimation.data._simulated import moves_between_rows
+from deadtime.estimation.evidence._estimate import call_with
 from deadtime.estimation.evidence._find import is_outside
 from deadtime.estimation.evidence._found import CLEAR, PlantCandidate, candidate_of
 from deadtime.estimation.evidence._question import PLANTS, Question, question_of
@@ -73,7 +74,8 @@ def beside_rivals(fit: DelayEstimate, run: Run, method: Method) -> DelayEstimate
     if best.plant == kind_of(plant, list(plant.parameters)):
         free = ("delay", *(name for name in plant.parameters if name in ("lag", *best.names)))
         return fit.doubted(why, f"free={free!r}")
-    return fit.doubted(why, f"the call without the plant, {_call(question)}")
+    given = {name: value for name, value in question.options().items() if value != (None, None)}
+    return fit.doubted(why, f"the call without the plant, {call_with(given)}")
 
 
 def kind_of(plant: Plant, free: Sequence[str]) -> str | None:
@@ -189,13 +191,3 @@ def _lead_in_air(fit: DelayEstimate, rival: PlantCandidate, run: Run, method: Me
     except (DeadtimeError, ValueError):
         return -math.inf
     return bic(fit) - bic(other) - len(held) * math.log(other.residuals.size)
-
-
-def _call(question: Question) -> str:
-    """The call that estimates without a plant."""
-    given = "".join(
-        f", {name}={f'dtm.{value!r}' if isinstance(value, P) else value}"
-        for name, value in question.options().items()
-        if value != (None, None)
-    )
-    return f"dtm.estimate_delay(recording{given})"

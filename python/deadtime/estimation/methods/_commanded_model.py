@@ -121,17 +121,11 @@ class CommandedModel(ModelOfOne):
         return float(self.recording.time[-1] - self.recording.time[0])
 
     def ends(self, label: str) -> Ends:
-        value = self.known.get(label, 1.0)
-        if label.startswith("lag_") and value >= 0.0:
-            # A shorter one acts as a delay, and takes ever longer to simulate.
-            return Ends(native.SHORTEST_LAG * self.recording.sample_time, self.span)
-        positive = Ends(1e-3 * abs(value), 1e3 * abs(value))
+        size = abs(self.known.get(label, 1.0))
         return {
             "delay": Ends(0.0, native.LONGEST_DELAY * self.span),
             "lag": Ends(0.0, self.span),
-            "time_constant": positive,
-            "rate": positive,
-            "rate_of_rate": positive,
+            **dict.fromkeys(("time_constant", *RATE_LIMITS), Ends(1e-3 * size, 1e3 * size)),
         }.get(label, Ends(-np.inf, np.inf))
 
 

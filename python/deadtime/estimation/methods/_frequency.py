@@ -134,9 +134,8 @@ class Frequency(OfOne):
         if lines.known_noise:
             p_value = float(special.chdtrc(lines.freedom, fit.cost / lines.widening))
             wider = max(lines.widening, scale)
-        cov = checks.embedded(
-            np.asarray(wider * np.linalg.inv(jacobian.T @ jacobian)), loose, len(names)
-        )
+        cov = np.zeros((len(names), len(names)))
+        cov[np.ix_(loose, loose)] = wider * np.linalg.inv(jacobian.T @ jacobian)
         errors = checks.standard_errors(names, cov)
         checks.check_gain(values, errors)
         found = {**known, **values}
