@@ -14,7 +14,6 @@ from deadtime.recordings import Recording
 
 if TYPE_CHECKING:
     from deadtime.estimation.planning._identifiability import Identifiability
-    from deadtime.estimation.planning._planned_bound import PlannedBound
 
 #: Half axis of the ellipse that holds 95 % of two Gaussian errors, in standard deviations.
 TWO_DIMENSIONS = float(np.sqrt(-2.0 * np.log(0.05)))
@@ -149,8 +148,10 @@ def _draw_slopes(ax: Axes, plan: Identifiability) -> None:
     """Effect of an error as large as the bound; similar curves are hard to tell apart."""
     bound = plan.bound
     for name, colour in zip(plan.free, drawing.COLOURS, strict=False):
-        moved = bound.sensitivities[name] * bound.stderr[name] / bound.noise.white
-        ax.plot(plan.recording.time, moved, color=colour, lw=1.2, label=_with_error(bound, name))
+        error = bound.stderr[name]
+        moved = bound.sensitivities[name] * error / bound.noise.white
+        shown = f"{error:.2g}" if name == "gain" else f"{1e3 * error:.2g} ms"
+        ax.plot(plan.recording.time, moved, color=colour, lw=1.2, label=f"{name} ({shown})")
     ax.set(xlabel="time (s)", ylabel="change of the output\nin units of the white noise")
     _legend_above(ax, "for one standard error of")
 
@@ -164,11 +165,6 @@ def _legend_above(ax: Axes, title: str) -> None:
         frameon=False,
         fontsize="small",
     )
-
-
-def _with_error(bound: PlannedBound, name: str) -> str:
-    error = bound.stderr[name]
-    return f"{name} ({error:.2g})" if name == "gain" else f"{name} ({1e3 * error:.2g} ms)"
 
 
 def _draw_ellipse(ax: Axes, plan: Identifiability) -> None:

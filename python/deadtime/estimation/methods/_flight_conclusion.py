@@ -221,11 +221,9 @@ def _remarks(left_out: int, scatter: Mapping[str, float], held: list[str]) -> li
         f"a standard deviation of {size:.2g} s"
         for what, size in scatter.items()
     ]
-    return (
-        [*said, f"the {' and '.join(held)} was estimated as zero, which is its bound"]
-        if held
-        else said
-    )
+    if held:
+        said.append(f"the {' and '.join(held)} was estimated as zero, which is its bound")
+    return said
 
 
 def read_as_intervals(estimate: DelayEstimate, models: Sequence[CommandedModel]) -> DelayEstimate:

@@ -136,12 +136,12 @@ def _estimated(
     begun = _begun(method, runs, names, assumed)
     if begun.is_exact:
         return begun.by_least_squares()
-    found = _likeliest(begun)
-    _check_delay(begun, found.profile)
-    adequacy = flight.adequacy_of(found.profile)
-    adequacy = replace(adequacy, reasons=(*found.doubts, *adequacy.reasons))
-    without = _without_the_plant(begun, found.profile, adequacy)
-    return without or _concluded(begun, found, adequacy)
+    profile, doubts, fitted = _likeliest(begun)
+    _check_delay(begun, profile)
+    adequacy = flight.adequacy_of(profile)
+    adequacy = replace(adequacy, reasons=(*doubts, *adequacy.reasons))
+    without = _without_the_plant(begun, profile, adequacy)
+    return without or _concluded(begun, profile, fitted, adequacy)
 
 
 class _Names(NamedTuple):
@@ -255,16 +255,11 @@ class _Begun:
         )
 
 
-class _Likeliest(NamedTuple):
-    """The likeliest plant and noise, doubts about its commands, and the recordings with it."""
+def _likeliest(begun: _Begun) -> tuple[native.FlightProfile, tuple[str, ...], list[base.Run]]:
+    """The likeliest plant and noise, doubts about its commands, and the recordings with it.
 
-    profile: native.FlightProfile
-    doubts: tuple[str, ...]
-    fitted: list[base.Run]
-
-
-def _likeliest(begun: _Begun) -> _Likeliest:
-    """Plant, noise and intervals, with the numbers around them and the commands between rows."""
+    With the numbers around them and the commands between rows.
+    """
     models, fitted = begun.models, begun.fitted
     fit = begun.whole.beside_noise()
     numbers = covariance = None
@@ -287,7 +282,7 @@ def _likeliest(begun: _Begun) -> _Likeliest:
         "rows are further apart than samples, and the recording does "
         "not show at which times between rows the reference changes",
     )
-    return _Likeliest(profile, doubts * unclear, fitted)
+    return profile, doubts * unclear, fitted
 
 
 def _check_delay(begun: _Begun, profile: native.FlightProfile) -> None:
@@ -319,15 +314,20 @@ def _without_the_plant(
     return None
 
 
-def _concluded(begun: _Begun, found: _Likeliest, adequacy: flight.Adequacy) -> DelayEstimate:
+def _concluded(
+    begun: _Begun,
+    profile: native.FlightProfile,
+    fitted: list[base.Run],
+    adequacy: flight.Adequacy,
+) -> DelayEstimate:
     """The estimate of the likelihood; of rounded rows alone, with each as an interval."""
-    profile, message = found.profile, f"maximum likelihood {begun.message}"
+    message = f"maximum likelihood {begun.message}"
     if adequacy.coloured:
         profile = profile.coloured()
         message += ", with wider intervals because the residuals are coloured also at rest"
     fit, details = profile.fit, begun.details(profile.fit.initial_output)
     estimate = flight.concluded_flight(
-        begun.method, begun.names.linear, found.fitted, profile, message, details, adequacy
+        begun.method, begun.names.linear, fitted, profile, message, details, adequacy
     )
     plain = begun.names.are_common and profile.is_plain and not adequacy.coloured
     if plain and not fit.is_long and estimate.verdict == "reliable" and fit.is_rounding_alone:
