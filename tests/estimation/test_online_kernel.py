@@ -26,10 +26,7 @@ def settings(**changed):
     """A bank without walk, jumps and an unknown scale."""
     count = len(changed.get("delays", DELAYS))
     given = {
-        "num": (1.0,),
-        "den": (1.0, 0.0),
-        "air_behind_lags": True,
-        "own_lag": 0.0,
+        "plant": FlightPlant([1.0], [1.0, 0.0], [], [], [], air_behind_lags=True),
         "delays": DELAYS,
         "follow": False,
         "layers": [([0.15], 0.0, [0.0] * count)],

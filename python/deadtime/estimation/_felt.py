@@ -65,10 +65,8 @@ def limits(loop: ControlLoop) -> tuple[float, float]:
     """
     if not loop.plant.is_linear:
         return math.nan, math.nan
-    around = loop.plant.transfer_function()
-    gain = loop.parameters.get("gain", 1.0)
-    sign = -1.0 if gain is not None and gain < 0.0 else 1.0
-    late = sign * around * delay(loop.delay or 0.0)
+    sign = -1.0 if loop.parameters.get("gain", 1.0) < 0.0 else 1.0
+    late = sign * loop.plant.transfer_function() * delay(loop.delay or 0.0)
     found = late.margin()
     largest = min(found.gain_margins[found.phase_crossovers > 0.0].tolist(), default=math.inf)
     if not math.isfinite(largest):

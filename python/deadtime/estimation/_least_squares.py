@@ -92,6 +92,16 @@ class Fit(ABC):
         """Weighted residuals, simulated minus recorded output, one recording after the other."""
         return self.problem.misfit(point)
 
+    @property
+    def low(self) -> Array:
+        """Lower bounds: the tightest of those that are common, then those of each recording."""
+        return self.problem.bounds()[0]
+
+    @property
+    def high(self) -> Array:
+        """Upper bounds."""
+        return self.problem.bounds()[1]
+
 
 #: Where a sum of squares is least, with the misfit there and its derivatives.
 Minimum: TypeAlias = native.LeastSquaresMinimum
@@ -102,7 +112,7 @@ class Ends(NamedTuple):
 
     low: float
     high: float
-    starts: Sequence[float] | Array = ()
+    starts: Sequence[float] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +161,7 @@ class ModelOfOne(Fit):
     @property
     def problem(self) -> native.LeastSquares:
         """The model as the kernel fits it."""
-        return native.LeastSquares([self], self.weights, len(self.names), *trading(self.names))
+        return native.LeastSquares([self], self.weights, self.names)
 
     @cached_property
     def size(self) -> float:
@@ -168,20 +178,10 @@ class ModelOfOne(Fit):
         """Samples of each recording, in the order of the misfit."""
         return (self.length,)
 
-    @cached_property
-    def low(self) -> Array:
-        """Lower bounds."""
-        return np.array([self.ends(label).low for label in self.labels])
-
-    @cached_property
-    def high(self) -> Array:
-        """Upper bounds."""
-        return np.array([self.ends(label).high for label in self.labels])
-
     @property
-    def axes(self) -> list[list[float]]:
-        """Values of each parameter at which searches start, the points of a grid."""
-        return [list(self.ends(label).starts) for label in self.labels]
+    def every_end(self) -> list[Ends]:
+        """Bounds of all parameters, and where searches start."""
+        return [self.ends(label) for label in self.labels]
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +202,7 @@ class JointModel(Fit):
     @property
     def problem(self) -> native.LeastSquares:
         """The models as the kernel fits them."""
-        return native.LeastSquares(self.parts, self.weights, len(self.names), *trading(self.names))
+        return native.LeastSquares(self.parts, self.weights, self.names)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -229,16 +229,6 @@ class JointModel(Fit):
         """Samples of each recording."""
         return tuple(part.length for part in self.parts)
 
-    @property
-    def low(self) -> Array:
-        """Lower bounds: the tightest of those that are common, then those of each recording."""
-        return self.problem.bounds()[0]
-
-    @property
-    def high(self) -> Array:
-        """Upper bounds."""
-        return self.problem.bounds()[1]
-
 
 #: A model of one recording, or of several.
 Model: TypeAlias = ModelOfOne | JointModel
@@ -256,21 +246,6 @@ def solve_jointly(parts: Sequence[ModelOfOne]) -> tuple[Model, Minimum]:
     if whiteness_of(found.misfit, len(model.names), model.sizes).white:
         return model, found
     return by_size, first
-
-
-def place_of(name: str, names: Sequence[str]) -> int | None:
-    """The place of a name, if it is among them."""
-    return names.index(name) if name in names else None
-
-
-def trading(names: Sequence[str]) -> tuple[int | None, int | None]:
-    """The places of the delay and of a lag, which acts like it."""
-    return place_of("delay", names), place_of("lag", names)
-
-
-def without_vanishing(model: Model, found: Minimum) -> Minimum:
-    """Set lags and delays to zero where this does not change the cost beyond rounding."""
-    return model.problem.without_vanishing(found, *trading(model.names), model.size)
 
 
 #: Farthest end of an interval, in multiples of the Gaussian one.

@@ -26,14 +26,9 @@ def behind_limits(plant: Plant) -> Plant:
 def names_in_kernel(plant: Plant) -> tuple[str, ...]:
     """The numbers of a loop with this plant that the kernel fits."""
     plant = behind_limits(plant)
-    own: tuple[str, ...] = ()
-    if isinstance(plant, loops.Integrator):
-        own = ("lag",)
-    elif isinstance(plant, loops.FirstOrder):
-        own = ("time_constant",)
-    elif isinstance(plant, loops.FactoredPlant):
-        own = tuple(name for name in plant.parameters if name not in loops.PAIR)
-    return ("delay", "gain", *own)
+    if not isinstance(plant, (loops.Integrator, loops.FirstOrder, loops.FactoredPlant)):
+        return ("delay", "gain")
+    return ("delay", *(name for name in plant.parameters if name not in loops.PAIR))
 
 
 def plant_model(plant: Plant, names: tuple[str, ...], air_behind_lags: bool = False) -> FlightPlant:

@@ -19,6 +19,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError, RecordingError
+from deadtime._base.validation import OpenRange
 from deadtime.estimation._native import LoopMisfit
 from deadtime.estimation.data._checks import start_and_span
 from deadtime.loops import ControlLoop, P
@@ -142,10 +143,7 @@ class SimulatedRecording:
     """
 
     def __init__(
-        self,
-        recording: Recording,
-        loop: ControlLoop,
-        window: tuple[float | None, float | None] = (None, None),
+        self, recording: Recording, loop: ControlLoop, window: OpenRange = (None, None)
     ) -> None:
         rows = recording.rows(*window)
         # The recorded output is the one that the controller received, wherever the delay is.
@@ -209,12 +207,11 @@ def _check_work(window: Recording, loop: ControlLoop) -> None:
             f"{len(window)} samples are more than the {MOST_SAMPLES} that a fit "
             f"can simulate in reasonable time: {advice}, or keep every tenth sample"
         )
-    held = 0.0
-    if loop.sample_time is not None:
-        held = float(window.time[-1] - window.time[0]) / loop.sample_time
+    span = float(window.time[-1] - window.time[0])
+    held = span / (loop.sample_time or math.inf)
     if held > MOST_SAMPLES:
         raise RecordingError(
-            f"the recording lasts {window.time[-1] - window.time[0]:g} s, which "
+            f"the recording lasts {span:g} s, which "
             f"is {held:.3g} times the sample_time of {loop.sample_time:g} s: "
             f"{advice}, and check that the time stamps are seconds"
         )

@@ -19,7 +19,7 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import extremes_decay, step_extremes
 from deadtime.estimation.data._checks import excited
 from deadtime.loops import ControlLoop, Integrator, P
-from deadtime.recordings import Recording, Step
+from deadtime.recordings import Recording, Step, noise_of_second_differences
 
 #: Smallest size of what is read from the response, in standard deviations of the noise.
 CLEARANCE = 3.0
@@ -138,11 +138,6 @@ def _noise(before: Array, tail: Array) -> float:
         return resting
     # Few samples often give too small a value.
     return max(resting, noise_of_second_differences(tail))
-
-
-def noise_of_second_differences(values: Array) -> float:
-    """Standard deviation of the noise on a smooth signal of at least three values."""
-    return float(np.median(np.abs(np.diff(values, 2)))) / 0.6745 / math.sqrt(6.0)
 
 
 class Extreme(NamedTuple):

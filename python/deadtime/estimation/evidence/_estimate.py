@@ -193,8 +193,7 @@ def _reliable_part(question: Question) -> OpenRange | None:
 def moves_in(fit: FoundPlant) -> bool:
     """Whether the command changes in the rows that count."""
     for run, question in zip(fit.runs, fit._question.each, strict=True):
-        used = ~np.isnan(run.residuals)
-        first = int(used.argmax()) if used.any() else 0
+        first = int(np.argmax(~np.isnan(run.residuals)))
         command = question.command[max(first - 1, 0) :]
         if bool((command != command[0]).any()):
             return True

@@ -49,7 +49,7 @@ def _beside_all(fit: PlantEstimate, found: native.FamilyFit) -> PlantEstimate:
     question = fit._question
     if question.plant is None:
         return fit
-    whole = question.of(None).answer()
+    whole = replace(question, plant=None).answer()
     best, least = whole.candidates[0], found.candidates[0].bic
     if not least - best.bic > CLEAR:
         return fit
@@ -125,10 +125,11 @@ def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
         numbers = {name: getattr(candidates[0], name) for name in numbers}
     steps = [native.coarse_step(run.recording.output, run.noise_std) for run in runs]
     step = next(filter(None, steps), 0.0)
+    is_one_step = not question.others and np.count_nonzero(np.diff(question.command)) == 1
     verdict = "indication" if step and found.verdict == "reliable" else found.verdict
     return PlantEstimate(
         verdict=cast(Verdict, verdict),
-        reason=evidence.reason_of(found.reason, found, _is_one_step(question), step),
+        reason=evidence.reason_of(found.reason, found, is_one_step, step),
         **numbers,
         **found.shown,
         candidates=candidates,
@@ -144,11 +145,6 @@ def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
         _question=question,
         _native=[found],
     )
-
-
-def _is_one_step(question: Question) -> bool:
-    """Whether the command changes once, in one recording."""
-    return not question.others and np.count_nonzero(np.diff(question.command)) == 1
 
 
 def _run(question: Question, first: native.FamilyCandidate | None, place: int) -> FittedRecording:

@@ -58,6 +58,10 @@ PLANTS = (
 )
 
 
+#: What the kernel is told of all records together, by its names.
+ASKED = ("between", "closed_loop", "at_rest", "largest_delay", "plant", "integrates", "causes")
+
+
 @dataclass(frozen=True, eq=False)
 class Question(ReadOnlyArrays):
     """A record and what is known of it, as the kernel takes it.
@@ -129,23 +133,8 @@ class Question(ReadOnlyArrays):
         that alone.
         """
         records = [part.record for part in self.each]
-        return native.fit_family(
-            records,
-            kind=self.between,
-            controller=self.closed_loop,
-            at_rest=self.at_rest,
-            largest_delay=self.largest_delay,
-            plant=self.plant,
-            integrating=self.integrates,
-            noise=noise,
-            causes=self.causes,
-            progress=progress,
-            known=known,
-        )
-
-    def of(self, plant: str | None) -> Question:
-        """The same for another kind of plant."""
-        return replace(self, plant=plant)
+        asked: dict[str, Any] = {name: getattr(self, name) for name in ASKED}
+        return native.fit_family(records, **asked, noise=noise, progress=progress, known=known)
 
     def options(self) -> dict[str, Any]:
         """What was given besides the recording, as arguments of `estimate_delay`."""

@@ -61,7 +61,7 @@ def beside_rivals(fit: DelayEstimate, run: Run, method: Method) -> DelayEstimate
     best = found.candidates[0]
     rival = candidate_of(best, best.bic)
     lead = min(lead, _lead_in_air(fit, rival, run, method))
-    if lead > CLEAR and (named := _answer(asked.of(kind))) is not None:
+    if lead > CLEAR and (named := _answer(replace(asked, plant=kind))) is not None:
         lead = min(lead, _bic_of(named, kind) - best.bic)
     if not lead > CLEAR:
         return fit

@@ -23,7 +23,7 @@ import numpy as np
 import deadtime.estimation._native as native
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._least_squares import Ends, ModelOfOne, place_of
+from deadtime.estimation._least_squares import Ends, ModelOfOne
 from deadtime.estimation._plant import behind_limits, plant_model
 from deadtime.estimation.data._checks import check_moves
 from deadtime.estimation.data._simulated import commands_of, limited
@@ -85,36 +85,28 @@ class CommandedModel(ModelOfOne):
         values |= dict(zip(fit.plant.lag_names, numbers.lags, strict=True))
         known = {**self.known, **{name: values[name] for name in self.known if name in values}}
         point = np.array([*(values[name] for name in self.names), 0.0])
-        moved = replace(self, known=known)
-        if self.offset is not None:
-            return replace(moved, start=point[:-1])
-        point[-1] = -float(np.mean(moved.misfit(point)))
-        return replace(moved, start=point)
+        moved = replace(self, known=known, start=point[: len(self.labels)])
+        if self.offset is None:
+            point[-1] = -float(np.mean(moved.misfit(point)))
+        return moved
 
     @property
     def kernel(self) -> native.CommandedMisfit:
         """The misfit of the kernel."""
         plant, data, commands = behind_limits(self.plant), self.recording, self.commands
-        is_lag = isinstance(plant, FirstOrder)
-        slow = "time_constant" if is_lag else "lag" if isinstance(plant, Integrator) else ""
+        slow = {Integrator: "lag", FirstOrder: "time_constant"}.get(type(plant), "")
         numbers = {**plant.parameters, **self.known, "gain": 1.0}
-        names = ("delay", "gain", slow, *RATE_LIMITS)
         return native.CommandedMisfit(
             data.time,
             data.output,
             (commands.time, commands.command),
             plant=None if slow else plant._polynomials(numbers),
-            is_lag=is_lag,
+            slow=slow,
             is_limited=isinstance(self.plant, RateLimited),
-            known=[self.known.get(name, math.inf) for name in names],
-            places=[place_of(name, self.names) for name in names],
+            names=self.names,
+            known=self.known,
             start=self.offset,
         )
-
-    @property
-    def axes(self) -> list[list[float]]:
-        """The point that the search starts from."""
-        return [[value] for value in self.start.tolist()]
 
     @cached_property
     def span(self) -> float:
@@ -122,11 +114,12 @@ class CommandedModel(ModelOfOne):
 
     def ends(self, label: str) -> Ends:
         size = abs(self.known.get(label, 1.0))
-        return {
+        found = {
             "delay": Ends(0.0, native.LONGEST_DELAY * self.span),
             "lag": Ends(0.0, self.span),
             **dict.fromkeys(("time_constant", *RATE_LIMITS), Ends(1e-3 * size, 1e3 * size)),
         }.get(label, Ends(-np.inf, np.inf))
+        return found._replace(starts=[float(self.start[self.labels.index(label)])])
 
 
 def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> CommandedModel:

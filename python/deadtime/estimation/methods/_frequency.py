@@ -181,11 +181,7 @@ class _Lines(least_squares.ModelOfOne):
     @property
     def kernel(self) -> LinesMisfit:
         """The misfit of the kernel."""
-        numbers = ("delay", "gain", "lag")
-        places = [least_squares.place_of(name, self.names) for name in numbers]
-        return self.made(
-            ([self.known[name] for name in numbers], places, self.recording.sample_time)
-        )
+        return self.made((self.names, self.known, self.recording.sample_time))
 
     def ends(self, label: str) -> least_squares.Ends:
         """Bounds and starting values of one of the parameters."""
@@ -195,13 +191,13 @@ class _Lines(least_squares.ModelOfOne):
 
     def fit(self) -> least_squares.Minimum:
         """The parameters of least cost; a lag that does not reduce it is zero."""
-        row, lag = self.recording.sample_time, least_squares.place_of("lag", self.names)
+        row = self.recording.sample_time
         if "delay" not in self.names:
-            return self.problem.without_vanishing(self.problem.solve(), None, lag, 0.0)
+            return self.problem.without_vanishing(self.problem.solve(), 0.0)
         count = int(min(MOST_POINTS, max(2.0, self.longest / row)))
         grid = np.linspace(0.0, self.longest, count + 1)
         guess = np.array([self.known["gain"] if name == "gain" else row for name in self.names])
-        costs, _, found = self.problem.scan(grid, guess, lag, 0.0)
+        costs, _, found = self.problem.scan(grid, guess, 0.0)
         if int(np.argmin(costs)) == count:
             raise NotIdentifiableError(
                 f"the search ends at its longest delay, {grid[-1]:.3g} s, so the "

@@ -180,8 +180,9 @@ def concluded(
     errors, plain = checks.standard_errors(names, spread), checks.standard_errors(names, white)
     freedom = residuals.size - len(loose)
     reason = _why_profile(values, residuals.size, count)
+    of_loop = {name: value for name, value in values.items() if name != "start"}
     runs = tuple(
-        result.FittedRun(part.recording, _with(part.loop, values), -misfit)
+        result.FittedRun(part.recording, part.loop.replace(**of_loop), -misfit)
         for part, misfit in zip(fitted, _misfits(model, found), strict=True)
     )
     return result.DelayEstimate(
@@ -240,10 +241,6 @@ def _misfits(model: least_squares.Model, found: least_squares.Minimum) -> list[A
     """The misfit of each recording, without weights."""
     pieces = least_squares.pieces_of(found.misfit, model.sizes)
     return [piece / weight for piece, weight in zip(pieces, model.weights, strict=True)]
-
-
-def _with(loop: ControlLoop, values: Mapping[str, float]) -> ControlLoop:
-    return loop.replace(**{name: value for name, value in values.items() if name != "start"})
 
 
 def _why_profile(values: Mapping[str, float], samples: int, numbers: int) -> str:

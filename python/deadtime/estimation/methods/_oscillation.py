@@ -58,7 +58,7 @@ from deadtime._base.validation import positive
 from deadtime.estimation.data._checks import delay_and, integrator_of
 from deadtime.estimation.methods._method import OfOne, Read, Run
 from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording
+from deadtime.recordings import Recording, noise_of_second_differences
 
 #: Fewest samples of a tail.
 FEWEST_OF_TAIL = 5
@@ -321,26 +321,24 @@ class Relay(OfOne):
         signs, height = _relay(data, self.amplitude)
         error = data.output - data.reference
         # Second differences of straight lines are noise, except at the corners.
-        noise = steps.noise_of_second_differences(error)
-        crossings = native.cycle_crossings(data.time, error, noise)[LEFT_OUT:]
-        _check_cycle(crossings, error, data.time)
-        switches = _switches(data.time, signs, crossings, loop.is_sampled)
+        noise = noise_of_second_differences(error)
+        cycle = native.LimitCycle(data.time, data.output, data.reference, noise, LEFT_OUT)
+        crossings, peaks = _checked_cycle(cycle, error)
+        switches = _switches(cycle, signs) if loop.is_sampled else crossings[:-1]
         half = float(np.mean(np.diff(crossings)))
-        count, mean, stderr = native.cycle_delays(crossings, switches)
-        delay = mean - native.cycle_delay_by_lag(plant.lag, half)
+        count, mean, stderr = cycle.delays(switches)
+        delay = mean - cycle.delay_by_lag(plant.lag, half)
         if delay <= 0.0:
             raise NotIdentifiableError(
                 f"lag and hold explain a quarter of the period, {0.5 * half:.3g} s. "
                 f"So the lag is shorter than {plant.lag:g} s, or there is no delay"
             )
-        columns = data.time, data.output, data.reference
-        found = native.cycle_path(columns, switches, delay, plant.lag)
+        found = cycle.path(switches, delay, plant.lag)
         assert found is not None  # there are rows between the first and the last crossing
         ends, path, output, fitted = found
         first, last = data.time[ends].tolist()
         slope = abs(plant.gain) * height if height is not None else abs(fitted)
         waits = float(np.mean(switches - crossings[:-1]))
-        peaks = native.cycle_peaks(data.time, error, crossings)
         return Read(
             {"delay": delay},
             stderr,
@@ -384,8 +382,9 @@ def _relay(data: Recording, amplitude: float | None) -> tuple[Array, float | Non
     return np.where(data.command >= 0.0, 1.0, -1.0), size
 
 
-def _check_cycle(crossings: Array, error: Array, time: Array) -> None:
-    """Refuse what is no sustained oscillation around the reference."""
+def _checked_cycle(cycle: native.LimitCycle, error: Array) -> tuple[Array, Array]:
+    """Crossings and peaks of a cycle; refuses what is no sustained oscillation."""
+    crossings = cycle.crossings
     if float(np.ptp(error)) == 0.0:
         raise NotIdentifiableError("the output does not move, so there is no limit cycle")
     if crossings.size < FEWEST + 1:
@@ -401,20 +400,19 @@ def _check_cycle(crossings: Array, error: Array, time: Array) -> None:
             f"{float(halves.min()):.3g} to {float(halves.max()):.3g} s. "
             "So this is noise or a changing reference, not a limit cycle"
         )
-    peaks = native.cycle_peaks(time, error, crossings)
+    peaks = cycle.peaks
     if peaks[-1] < SHRINKING * peaks[0]:
         raise NotIdentifiableError(
             f"the oscillation decays from {peaks[0]:.3g} to {peaks[-1]:.3g}, so no "
             "relay sustains this oscillation. Use method='decrement' or 'waveform'"
         )
+    return crossings, peaks
 
 
-def _switches(time: Array, signs: Array, crossings: Array, sampled: bool) -> Array:
-    """Time of the switch at each crossing but the last; the crossing itself without samples."""
-    if not sampled:
-        return crossings[:-1]
-    counts, times = native.cycle_switches(time, signs, crossings)
-    for count, crossing in zip(counts, crossings, strict=False):
+def _switches(cycle: native.LimitCycle, signs: Array) -> Array:
+    """Time of the switch at each crossing but the last."""
+    counts, times = cycle.switches(signs)
+    for count, crossing in zip(counts, cycle.crossings, strict=False):
         if count % 2 == 0:
             raise NotIdentifiableError(
                 f"the command switches {count} times around the crossing at "

@@ -21,7 +21,7 @@ import deadtime.estimation.methods._commanded_model as commanded
 import deadtime.estimation.methods._flight_conclusion as flight
 import deadtime.estimation.methods._method as base
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._least_squares import Minimum, Model, solve_jointly, without_vanishing
+from deadtime.estimation._least_squares import Minimum, Model, solve_jointly
 from deadtime.estimation._plant import names_in_kernel, plant_model
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
@@ -237,7 +237,7 @@ class _Begun:
     def plain(self) -> tuple[Model, Minimum]:
         """Least squares with all its derivatives, from that of the likelihood."""
         model, found = solve_jointly([run.started(self.white, self.numbers) for run in self.models])
-        return model, without_vanishing(model, found)
+        return model, model.problem.without_vanishing(found, model.size)
 
     @property
     def is_exact(self) -> bool:
@@ -315,10 +315,7 @@ def _without_the_plant(
 
 
 def _concluded(
-    begun: _Begun,
-    profile: native.FlightProfile,
-    fitted: list[base.Run],
-    adequacy: flight.Adequacy,
+    begun: _Begun, profile: native.FlightProfile, fitted: list[base.Run], adequacy: flight.Adequacy
 ) -> DelayEstimate:
     """The estimate of the likelihood; of rounded rows alone, with each as an interval."""
     message = f"maximum likelihood {begun.message}"

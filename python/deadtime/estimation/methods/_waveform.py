@@ -144,7 +144,7 @@ class Waveform(base.Method):
         names = checks.checked_names(free, runs[0].loop, checks.LOOP_PARAMETERS)
         models = [simulated_model(run, names, self.initial_output) for run in runs]
         model, found = least_squares.solve_jointly(models)
-        found = least_squares.without_vanishing(model, found)
+        found = model.problem.without_vanishing(found, model.size)
         checks.check_ends(names, found.point, model.low, model.high)
         return base.concluded(
             self.name,
@@ -194,7 +194,7 @@ class SimulatedModel(least_squares.ModelOfOne):
         shortest = lag = shortest_time(recording)
         if loop.is_sampled:
             shortest, lag = 0.0, self.least_lag * recording.sample_time
-        delays = np.geomspace(0.003, 0.6, DELAY_POINTS) * span
+        delays = (np.geomspace(0.003, 0.6, DELAY_POINTS) * span).tolist()
         found = {
             "delay": least_squares.Ends(shortest, span, delays),
             "lag": least_squares.Ends(lag, span, [0.02 * span]),
@@ -205,8 +205,8 @@ class SimulatedModel(least_squares.ModelOfOne):
             return found
         value = loop.parameters[label]
         low, high = sorted((1e-3 * value, 1e3 * value))
-        factors = np.array(GAIN_FACTORS) if label == "gain" else np.ones(1)
-        return least_squares.Ends(low, high, factors * value)
+        factors = GAIN_FACTORS if label == "gain" else (1.0,)
+        return least_squares.Ends(low, high, [factor * value for factor in factors])
 
 
 def simulated_model(
@@ -273,7 +273,6 @@ class Grid(base.OfOne):
         costs, minima, found = model.problem.scan(
             grid,
             np.array([guesses.get(label, 0.0) for label in labels]),
-            least_squares.place_of("lag", names),
             len(data) * (checks.ROUNDING * model.size) ** 2,
         )
         if int(np.argmin(costs)) == grid.size - 1:
@@ -441,15 +440,15 @@ class _ChebyshevModel(least_squares.ModelOfOne):
     @property
     def kernel(self) -> ChebyshevMisfit:
         """The misfit of the kernel."""
-        data, known = self.recording, self.loop.parameters
+        data = self.recording
         rows = [0, *(step.index for step in data.steps())]
         units = {"lag": data.sample_time, "initial output": self.size}
         return ChebyshevMisfit(
             data.time,
             data.output,
             list(zip(data.time[rows].tolist(), data.reference[rows].tolist(), strict=True)),
-            known=(0.0, known["gain"], known["lag"], known["Kp"]),
-            places=[least_squares.place_of(name, self.names) for name in ("delay", "gain", "lag")],
+            names=self.names,
+            known=self.loop.parameters,
             start=self.offset,
             intervals=self.intervals,
             is_late=self.loop.delay_path == "command",
@@ -460,10 +459,9 @@ class _ChebyshevModel(least_squares.ModelOfOne):
         """Bounds and starting values of one of the parameters."""
         start, span = checks.start_and_span(self.recording)
         gain = self.loop.parameters["gain"]
+        delays = (np.geomspace(SHORTEST, LONGEST, CTA_POINTS) * span).tolist()
         return {
-            "delay": least_squares.Ends(
-                1e-4 * span, span, np.geomspace(SHORTEST, LONGEST, CTA_POINTS) * span
-            ),
+            "delay": least_squares.Ends(1e-4 * span, span, delays),
             "gain": least_squares.Ends(1e-3 * gain, 1e3 * gain, [gain]),
             "lag": least_squares.Ends(0.0, span, [0.02 * span]),
             "initial output": least_squares.Ends(-np.inf, np.inf, [start]),

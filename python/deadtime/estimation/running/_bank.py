@@ -43,10 +43,7 @@ COARSE = 0.01
 class BankSettings(NamedTuple):
     """The settings of the kernel, by its names."""
 
-    num: list[float]
-    den: list[float]
-    air_behind_lags: bool
-    own_lag: float
+    plant: FlightPlant
     delays: list[float]
     follow: bool
     layers: list[tuple[list[float], float, list[float]]]
@@ -214,25 +211,6 @@ class OnlineEstimate:
         return f"{text}; {self.message}" if self.message else text
 
 
-def reasons_against(numbers: BankAnswer, white: float, range_: tuple[float, float]) -> list[str]:
-    """Why the model does not hold at this row; `white` is the noise that was expected."""
-    found = []
-    if abs(numbers.colour) > COLOURED:
-        found.append(
-            "the innovations are not white, so the noise differs "
-            "from the given noise, or the plant model is incomplete"
-        )
-    if numbers.unexplained > UNEXPLAINED:
-        found.append("the innovations follow the command, so the plant model is incomplete")
-    if numbers.highest > AT_END:
-        found.append(f"the delay may exceed the longest that is tried, {range_[1]:.3g} s")
-    if numbers.lowest > AT_END and range_[0] > 0.0:
-        found.append(f"the delay may be below the shortest that is tried, {range_[0]:.3g} s")
-    if numbers.white > LOUDER * white:
-        found.append(f"the noise is {numbers.white / white:.1f} times the expected noise")
-    return found
-
-
 def estimate_of(
     numbers: BankAnswer,
     white: float,
@@ -240,11 +218,27 @@ def estimate_of(
     doubts: Sequence[str] = (),
     changes: int = 0,
 ) -> OnlineEstimate:
-    """The estimate of the kernel's answer, after so many changes in a minute."""
-    known = numbers.high - numbers.low < NARROWER * (range_[1] - range_[0])
-    against = [*doubts, *reasons_against(numbers, white, range_)]
+    """The estimate of the kernel's answer, after so many changes in a minute.
+
+    `white` is the noise that was expected, and `doubts` are why the model did not hold before.
+    """
+    against = [*doubts]
+    if abs(numbers.colour) > COLOURED:
+        against.append(
+            "the innovations are not white, so the noise differs "
+            "from the given noise, or the plant model is incomplete"
+        )
+    if numbers.unexplained > UNEXPLAINED:
+        against.append("the innovations follow the command, so the plant model is incomplete")
+    if numbers.highest > AT_END:
+        against.append(f"the delay may exceed the longest that is tried, {range_[1]:.3g} s")
+    if numbers.lowest > AT_END and range_[0] > 0.0:
+        against.append(f"the delay may be below the shortest that is tried, {range_[0]:.3g} s")
+    if numbers.white > LOUDER * white:
+        against.append(f"the noise is {numbers.white / white:.1f} times the expected noise")
     if changes >= RESTLESS:
         against.append(f"{changes} changes in a minute, so the plant model is incomplete")
+    known = numbers.high - numbers.low < NARROWER * (range_[1] - range_[0])
     message = "; ".join(f"not reliable: {reason}" for reason in against)
     if not known:
         waits = (

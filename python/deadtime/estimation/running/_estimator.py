@@ -156,10 +156,7 @@ class OnlineEstimator:
         known = loop.parameters.get("gain")
         size = abs(known) if known else 1.0
         self._settings = bank.BankSettings(
-            num=model.num,
-            den=model.den,
-            air_behind_lags=model.air_behind_lags,
-            own_lag=model.own_lag,
+            plant=model,
             delays=points.tolist(),
             follow=bank.is_range(delays),
             layers=[
