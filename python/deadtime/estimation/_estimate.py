@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, overload
 
+import deadtime.estimation.methods._method as base
 from deadtime._base.digits import shown
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import REASONS, DelayEstimate
@@ -336,10 +337,7 @@ def method_of(method: str | Method, recordings: Iterable[Recording]) -> Method:
             f"method must be a name or an object such as Waveform(), not {type(method).__name__}"
         )
     name = automatic_method(recordings) if method == "auto" else method
-    if name not in METHODS:
-        raise ValueError(
-            f"method={name!r} is not one of {', '.join(map(repr, ('auto', *METHODS)))}"
-        )
+    base.check_choice("method", name, ("auto", *METHODS))
     return METHODS[name]()
 
 

@@ -139,7 +139,7 @@ def _advice_on(fit: FoundPlant, given: dict[str, Any]) -> Advice:
         return Advice(
             f"design a {kind} controller for the whole interval of the dead time", controller=kind
         )
-    if fit._better is not None:
+    if fit.better is not None:
         words = "leave out the plant, because another kind of plant is more likely"
         return Advice(words, {"plant": None}, given)
     if fit._code == TAKEN_AT_REST or fit.reason == TOO_EARLY:
@@ -265,6 +265,8 @@ class PlantEstimate(FoundPlant, Pictured):
         are those of the plant without it.
     sensor_faults : tuple of SensorFault
         Rows that are no readings of the sensor, such as frozen ones. They were left out.
+    better : PlantCandidate or None
+        A plant that explains the recording clearly better than the one that was named.
     others : tuple of FittedRecording
         The further recordings of a joint estimate; `recording`, `fitted` and `residuals` are those
         of the first, `runs` has all.

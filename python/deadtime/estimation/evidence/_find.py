@@ -54,7 +54,7 @@ def _beside_all(fit: PlantEstimate, found: native.FamilyFit) -> PlantEstimate:
     if not least - best.bic > CLEAR:
         return fit
     better = candidate_of(best, least)
-    named = replace(fit, _better=better)
+    named = replace(fit, better=better)
     # A cause may imitate the lag that the plant lacks.
     is_open = bool(fit.causes) or is_outside(whole, partial(_ends, found))
     if named.verdict != "reliable" or not is_open:

@@ -127,10 +127,10 @@ class FoundPlant(AtCrossover, ReadOnlyArrays):
     others: tuple[FittedRecording, ...] = ()
     causes: tuple[Cause, ...] = ()
     sensor_faults: tuple[SensorFault, ...] = ()
+    better: PlantCandidate | None = None
     _own_noise: float = math.nan
     _code: str = ""
     _question: Question = field(kw_only=True)
-    _better: PlantCandidate | None = None
     _at_crossover: tuple[float, float, float] = (math.nan, math.nan, math.nan)
     _native: list[native.FamilyFit] = field(default_factory=list)
 
@@ -140,11 +140,6 @@ class FoundPlant(AtCrossover, ReadOnlyArrays):
         if not self.candidates:
             raise ValueError(f"no plant: {self.reason}")
         return self.candidates[0]
-
-    @property
-    def better(self) -> PlantCandidate | None:
-        """A plant that explains the recording clearly better than the one that was named."""
-        return self._better
 
     @property
     def runs(self) -> tuple[FittedRecording, ...]:

@@ -214,8 +214,7 @@ class GCC(OfOne):
             read.command, np.sign(gain) * read.response, self.weighting, (least, read.longest)
         )
         share = _explained(read, shift)
-        peak = shift + between
-        delay = max(0.0, peak * read.sample_time - read.late)
+        delay = max(0.0, (shift + between) * read.sample_time - read.late)
         return Read(
             {"delay": delay},
             None,

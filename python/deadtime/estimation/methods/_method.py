@@ -30,6 +30,7 @@ from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import OpenRange, finite, open_interval
 from deadtime._base.verdicts import Verdict, verdict_if
+from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.evidence._question import given_recordings, one_each
 from deadtime.experiments import FlightNoise
@@ -107,7 +108,7 @@ class Method(ABC):
     limits: ClassVar[str] = ""
 
     @abstractmethod
-    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> result.DelayEstimate:
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the runs; to exactly one unless the method is `joint`."""
 
 
@@ -147,7 +148,7 @@ def concluded(
     *,
     message: str,
     details: Mapping[str, Any],
-) -> result.DelayEstimate:
+) -> DelayEstimate:
     """Make the estimate of a minimum.
 
     Parameters
@@ -169,8 +170,7 @@ def concluded(
     # A further fitted parameter at its bound is held there too.
     close = AT_BOUND * (model.high - model.low)
     at_bound = (found.point - model.low <= close) | (model.high - found.point <= close)
-    along = np.arange(len(labels)) >= count
-    fixed = np.isfinite(close) & at_bound & along
+    fixed = np.isfinite(close) & at_bound & (np.arange(len(labels)) >= count)
     loose = [i for i, label in enumerate(labels) if label not in held and not fixed[i]]
     residuals = -found.misfit
     white, robust = spreads_of(found, labels, loose, model.sizes)
@@ -185,7 +185,7 @@ def concluded(
         result.FittedRun(part.recording, part.loop.replace(**of_loop), -misfit)
         for part, misfit in zip(fitted, _misfits(model, found), strict=True)
     )
-    return result.DelayEstimate(
+    return DelayEstimate(
         **result.of_runs(runs),
         method=method,
         free=names,
@@ -345,7 +345,7 @@ class OfOne(Method):
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from one recording."""
 
-    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> result.DelayEstimate:
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Read `free` from the one recording."""
         (run,) = runs
         found = self.read(run, self.names(free, run.loop))
@@ -358,7 +358,7 @@ class OfOne(Method):
             cov = np.full((len(names), len(names)), cov**2)
         whiteness = least_squares.whiteness_of(residuals, len(names))
         passes = whiteness.white or is_rounding(residuals, recording)
-        return result.DelayEstimate(
+        return DelayEstimate(
             method=self.name,
             loop=run.loop.replace(**found.values),
             free=names,

@@ -25,6 +25,8 @@ from deadtime.estimation._least_squares import Minimum, Model, solve_jointly
 from deadtime.estimation._plant import names_in_kernel, plant_model
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
+from deadtime.estimation.methods._commanded_model import GivenFilter
+from deadtime.estimation.methods._method import Method, Run
 from deadtime.loops import ControlLoop
 
 #: Residuals of a first fit below which, as a share of the range of the output, all may be rounding.
@@ -32,7 +34,7 @@ NEARLY_EXACT = 1e-4
 
 
 @dataclass(frozen=True)
-class OutputError(base.Method):
+class OutputError(Method):
     """Least squares on the response of the vehicle to the command as it was logged.
 
     Parameters
@@ -72,7 +74,7 @@ class OutputError(base.Method):
     """
 
     initial_output: float | None = None
-    output_filter: commanded.GivenFilter | None = None
+    output_filter: GivenFilter | None = None
     air: Literal["command", "vehicle"] = "command"
     intervals: Literal["all", "sum"] = "all"
     rivals: bool = True
@@ -86,7 +88,7 @@ class OutputError(base.Method):
         base.check_choice("intervals", self.intervals, ("all", "sum"))
         commanded.known_filter(self.output_filter)
 
-    def estimate(self, runs: Sequence[base.Run], free: Sequence[str]) -> DelayEstimate:
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the response of the plant to the logged commands."""
         known = commanded.known_filter(self.output_filter)
         integrating = (plant_model(run.loop.plant, ()).integrates for run in runs)
@@ -102,7 +104,7 @@ class OutputError(base.Method):
 
 
 def estimate_from_commands(
-    method: str, runs: Sequence[base.Run], free: Sequence[str], assumed: commanded.Assumed
+    method: str, runs: Sequence[Run], free: Sequence[str], assumed: commanded.Assumed
 ) -> DelayEstimate:
     """Fit the response to the command: logged, or computed from the recorded output.
 
@@ -129,7 +131,7 @@ def _criterion(estimate: DelayEstimate) -> float:
 
 
 def _estimated(
-    method: str, runs: Sequence[base.Run], free: Sequence[str], assumed: commanded.Assumed
+    method: str, runs: Sequence[Run], free: Sequence[str], assumed: commanded.Assumed
 ) -> DelayEstimate:
     """The estimate in stages: commands, least squares, noise, intervals, tests."""
     names = _Names.of(free, runs[0].loop)
@@ -190,7 +192,7 @@ class _Begun:
     """
 
     method: str
-    runs: Sequence[base.Run]
+    runs: Sequence[Run]
     names: _Names
     assumed: commanded.Assumed
     models: list[commanded.CommandedModel]
@@ -204,10 +206,10 @@ class _Begun:
         return self.whole.criterion + 2.0 * sum(model.commands.unknown for model in self.models)
 
     @property
-    def fitted(self) -> list[base.Run]:
+    def fitted(self) -> list[Run]:
         """The recordings as they are fitted."""
         pairs = zip(self.models, self.runs, strict=True)
-        return [base.Run(model.recording, run.loop) for model, run in pairs]
+        return [Run(model.recording, run.loop) for model, run in pairs]
 
     @property
     def message(self) -> str:
@@ -255,7 +257,7 @@ class _Begun:
         )
 
 
-def _likeliest(begun: _Begun) -> tuple[native.FlightProfile, tuple[str, ...], list[base.Run]]:
+def _likeliest(begun: _Begun) -> tuple[native.FlightProfile, tuple[str, ...], list[Run]]:
     """The likeliest plant and noise, doubts about its commands, and the recordings with it.
 
     With the numbers around them and the commands between rows.
@@ -315,7 +317,7 @@ def _without_the_plant(
 
 
 def _concluded(
-    begun: _Begun, profile: native.FlightProfile, fitted: list[base.Run], adequacy: flight.Adequacy
+    begun: _Begun, profile: native.FlightProfile, fitted: list[Run], adequacy: flight.Adequacy
 ) -> DelayEstimate:
     """The estimate of the likelihood; of rounded rows alone, with each as an interval."""
     message = f"maximum likelihood {begun.message}"
@@ -332,9 +334,7 @@ def _concluded(
     return estimate
 
 
-def _begun(
-    method: str, runs: Sequence[base.Run], names: _Names, assumed: commanded.Assumed
-) -> _Begun:
+def _begun(method: str, runs: Sequence[Run], names: _Names, assumed: commanded.Assumed) -> _Begun:
     """Least squares on recordings, with gaps in their commands or without if that is likelier."""
     begun = _begun_with(method, runs, names, assumed)
     if any(model.commands.lost for model in begun.models):
@@ -344,7 +344,7 @@ def _begun(
 
 
 def _begun_with(
-    method: str, runs: Sequence[base.Run], names: _Names, assumed: commanded.Assumed
+    method: str, runs: Sequence[Run], names: _Names, assumed: commanded.Assumed
 ) -> _Begun:
     """Least squares on recordings whose commands are as `assumed`."""
     models = [commanded.commanded_model(run, names.common, assumed) for run in runs]
@@ -387,7 +387,7 @@ def _given(
     return plant_model(plant, names.linear, assumed.air == "vehicle"), within
 
 
-def on_regular_times(run: base.Run) -> base.Run | None:
+def on_regular_times(run: Run) -> Run | None:
     """The run with the regular times that its stamps scatter around; None where there are none."""
     check, sample_time, recording = run.check, run.loop.sample_time, run.recording
     if check is None or check.stamps != "jittered":

@@ -64,6 +64,7 @@ from deadtime.estimation._result import CramerRaoBound, DelayEstimate
 from deadtime.estimation.data._simulated import SimulatedRecording, shortest_time
 from deadtime.estimation.data._step_reading import stiffness_of
 from deadtime.estimation.methods._commanded_model import Assumed
+from deadtime.estimation.methods._method import Method, OfOne, Read, Run
 from deadtime.estimation.methods._output_error import estimate_from_commands
 from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop
@@ -89,7 +90,7 @@ LIKELIHOOD_RATIO = 3.0
 
 
 @dataclass(frozen=True)
-class Waveform(base.Method):
+class Waveform(Method):
     """Least squares on the simulated response of the whole loop.
 
     Parameters
@@ -122,7 +123,7 @@ class Waveform(base.Method):
         base.check_choice("noise", self.noise, get_args(NoisePath))
         base.check_initial_output(self.initial_output)
 
-    def estimate(self, runs: Sequence[base.Run], free: Sequence[str]) -> DelayEstimate:
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the windows of the runs."""
         computed = Assumed(self.initial_output, computed=True)
         factors = set(runs[0].loop.plant.parameters) - set(checks.VEHICLE_PARAMETERS)
@@ -140,7 +141,7 @@ class Waveform(base.Method):
         likelier = _unlikelihood(innovations) - _unlikelihood(simulated)
         return simulated if likelier > LIKELIHOOD_RATIO else innovations
 
-    def _by_simulation(self, runs: Sequence[base.Run], free: Sequence[str]) -> DelayEstimate:
+    def _by_simulation(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         names = checks.checked_names(free, runs[0].loop, checks.LOOP_PARAMETERS)
         models = [simulated_model(run, names, self.initial_output) for run in runs]
         model, found = least_squares.solve_jointly(models)
@@ -150,7 +151,7 @@ class Waveform(base.Method):
             self.name,
             model,
             found,
-            [base.Run(part.recording, run.loop) for part, run in zip(models, runs, strict=True)],
+            [Run(part.recording, run.loop) for part, run in zip(models, runs, strict=True)],
             message=f"least squares over {', '.join(names)} on the response of the loop",
             details={
                 "initial_output": float([*found.point, self.initial_output][len(names)]),
@@ -210,7 +211,7 @@ class SimulatedModel(least_squares.ModelOfOne):
 
 
 def simulated_model(
-    run: base.Run, names: tuple[str, ...], offset: float | None = None
+    run: Run, names: tuple[str, ...], offset: float | None = None
 ) -> SimulatedModel:
     """The model of one recording; refuses one without excitation."""
     simulated = run.simulated
@@ -227,7 +228,7 @@ TWO_SIDED_95 = 1.96
 
 
 @dataclass(frozen=True)
-class Grid(base.OfOne):
+class Grid(OfOne):
     """Cost of the simulated loop over a grid of delays, its lowest point refined.
 
     Parameters
@@ -258,7 +259,7 @@ class Grid(base.OfOne):
         """The numbers that are asked for."""
         return checks.delay_and(free, loop, "grid")
 
-    def read(self, run: base.Run, names: tuple[str, ...]) -> base.Read:
+    def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
         loop, model = run.loop, simulated_model(run, names, self.initial_output)
         model = replace(model, least_lag=0.0)  # where it acts as a delay, a lag is none
@@ -296,7 +297,7 @@ class Grid(base.OfOne):
         noise = math.sqrt(found.cost / (residuals.size - len(loose)))
         reach = TWO_SIDED_95 * errors["delay"]
         low, high = max(0.0, float(point[0] - reach)), float(point[0] + reach)
-        return base.Read(
+        return Read(
             values,
             cov[: len(names), : len(names)],
             start=model.start_of(point),
@@ -352,7 +353,7 @@ MOST_NODES = 24
 
 
 @dataclass(frozen=True)
-class CTA(base.OfOne):
+class CTA(OfOne):
     """The waveform, with Chebyshev's approximation in the place of the delay.
 
     Parameters
@@ -390,7 +391,7 @@ class CTA(base.OfOne):
             )
         return names
 
-    def read(self, run: base.Run, names: tuple[str, ...]) -> base.Read:
+    def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
         loop, data = run.loop, run.simulated.recording
         checks.check_excitation(data, len(names))
@@ -404,11 +405,11 @@ class CTA(base.OfOne):
                 "this reference. Check columns, signs and gains"
             )
         count = len(names)
-        every = list(range(len(model.labels)))
+        every = [*range(len(model.labels))]
         cov = base.spreads_of(found, model.labels, every, model.sizes)[1][:count, :count]
         values = model.values(found.point)
         checks.check_gain(values, checks.standard_errors(names, cov))
-        return base.Read(
+        return Read(
             values,
             cov,
             model.start_of(found.point),

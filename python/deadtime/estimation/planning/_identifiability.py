@@ -320,7 +320,11 @@ def identifiability(
     known = tuple(dict.fromkeys([*VEHICLE_PARAMETERS, *loop.plant.parameters]))
     names = checked_names(free, loop, known)
     noise = _noise_with_covariance(noise)
-    _checked_start(initial_output)
+    if initial_output is not None and finite("initial_output", initial_output) != 0.0:
+        raise ValueError(
+            f"initial_output={initial_output}: an experiment starts at rest, with an output "
+            "of zero. Give 0.0 if the start is known, or None if the start is fitted"
+        )
     count = whole_number("runs", runs, least=0)
     offset = initial_output is None
     run_loop = experiment.loop_in_run(loop)
@@ -346,15 +350,6 @@ def identifiability(
     return Identifiability(
         loop, experiment, names, noise, initial_output, recording, logged, alone, tuple(remarks)
     )
-
-
-def _checked_start(initial_output: float | None) -> None:
-    """Refuse a known output at the start that is not that of an experiment."""
-    if initial_output is not None and finite("initial_output", initial_output) != 0.0:
-        raise ValueError(
-            f"initial_output={initial_output}: an experiment starts at rest, with an output "
-            "of zero. Give 0.0 if the start is known, or None if the start is fitted"
-        )
 
 
 def _noise_with_covariance(noise: float | FlightNoise) -> FlightNoise:

@@ -17,6 +17,7 @@ from deadtime.estimation._estimate import estimate_delay
 from deadtime.estimation._native import BankAnswer, OnlineBank
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.methods._output_error import OutputError
+from deadtime.estimation.running._bank import OnlineEstimate
 from deadtime.experiments import FlightNoise, Noise
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
@@ -236,7 +237,7 @@ class OnlineEstimator:
 
     def update(
         self, time: float, output: float | None, command: float | None = None
-    ) -> bank.OnlineEstimate:
+    ) -> OnlineEstimate:
         """Take in one row.
 
         Parameters
@@ -286,7 +287,7 @@ class OnlineEstimator:
         else:
             self._bank.command(time, value)
 
-    def run(self, rows: Iterable[Row]) -> Iterator[bank.OnlineEstimate]:
+    def run(self, rows: Iterable[Row]) -> Iterator[OnlineEstimate]:
         """An estimate for each row of an iterator, as it comes.
 
         Parameters
@@ -301,7 +302,7 @@ class OnlineEstimator:
         for time, output, command in rows:
             yield self.update(time, output, command)
 
-    def _estimate(self, answer: BankAnswer) -> bank.OnlineEstimate:
+    def _estimate(self, answer: BankAnswer) -> OnlineEstimate:
         assert self._noise is not None
         if answer.changed:
             self._changes.append(answer.time)
@@ -332,9 +333,7 @@ class OnlineEstimator:
         fitted = FlightNoise(white=fit.rms) if fit.noise is None else fit.noise
         self._begin(fitted if noise is None else _flight_noise(noise))
 
-    def _learn(
-        self, time: float, output: float | None, command: float | None
-    ) -> bank.OnlineEstimate:
+    def _learn(self, time: float, output: float | None, command: float | None) -> OnlineEstimate:
         """Keep a row until the noise is known; then go over all that were kept."""
         if self._rows and time <= self._rows[-1][0]:
             raise ValueError(
@@ -379,7 +378,7 @@ class OnlineEstimator:
         loop = self._loop.replace(delay=None)
         return estimate_delay(recording, loop, method=OutputError(rivals=False), free=free)
 
-    def _replay(self, fit: DelayEstimate) -> bank.OnlineEstimate:
+    def _replay(self, fit: DelayEstimate) -> OnlineEstimate:
         """Begin with the noise of a fit, and give the bank what was kept."""
         self._begin_after(fit, f"the fit of the first {LAST:.0f} s")
         assert self._bank is not None

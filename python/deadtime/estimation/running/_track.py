@@ -162,11 +162,7 @@ class DelayTrack(ReadOnlyArrays):
 
 
 def online(
-    recording: Recording,
-    loop: ControlLoop,
-    *,
-    window: OpenRange | None = None,
-    **options: Any,
+    recording: Recording, loop: ControlLoop, *, window: OpenRange | None = None, **options: Any
 ) -> DelayTrack:
     """The delay over a recording, as it would have been known at each row.
 
