@@ -195,7 +195,10 @@ def test_what_is_wrong_is_said_with_its_value():
         ({"level": 1.0}, "the level is 1"),
         ({"layers": [([-0.1], 0.0, [0.0] * 5)]}, "a lag is -0.1 s"),
         ({"layers": [([0.1], 0.0, [-math.inf] * 5)]}, "all prior weights are zero"),
-        ({"den": (1.0, *[0.0] * 7)}, "the filters can use at most 9"),
+        (
+            {"plant": FlightPlant([1.0], [1.0, *[0.0] * 7], [], [], [])},
+            "the filters can use at most 9",
+        ),
     ):
         with pytest.raises(ValueError, match=words):
             OnlineBank(settings(**changed))
