@@ -11,7 +11,6 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.digits import between
-from deadtime._base.plain import plain_fields
 from deadtime._base.validation import interval, non_negative
 from deadtime._base.verdicts import Verdict, claimed, verdict_if
 from deadtime.estimation._native import BankAnswer, FlightPlant
@@ -200,7 +199,10 @@ class OnlineEstimate:
 
     def to_dict(self) -> dict[str, Any]:
         """All numbers, as plain values for JSON."""
-        return plain_fields(asdict(self))
+        return {
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in asdict(self).items()
+        }
 
     def __str__(self) -> str:
         text = f"{self.time:.2f} s: {self.verdict}"
