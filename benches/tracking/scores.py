@@ -8,7 +8,7 @@ from operator import attrgetter
 import deadtime as dtm
 import numpy as np
 from deadtime.estimation import OnlineEstimator
-from deadtime.estimation.running._estimate import COLOURED, UNEXPLAINED
+from deadtime.estimation.running._bank import COLOURED, UNEXPLAINED
 from deadtime.experiments import FlightNoise
 
 from tracking import lagd

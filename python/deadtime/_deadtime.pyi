@@ -1,6 +1,6 @@
 """Signatures of the native part."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, Protocol, TypeAlias, final
 
 import numpy as np
@@ -526,13 +526,7 @@ class _Disturbance(Protocol):
 
 class _BankSettings(Protocol):
     @property
-    def num(self) -> Sequence[float]: ...
-    @property
-    def den(self) -> Sequence[float]: ...
-    @property
-    def air_behind_lags(self) -> bool: ...
-    @property
-    def own_lag(self) -> float: ...
+    def plant(self) -> FlightPlant: ...
     @property
     def delays(self) -> Sequence[float]: ...
     @property
@@ -896,7 +890,6 @@ def whiteness(pieces: Sequence[_Reals], parameters: int) -> tuple[float, float, 
 LEVEL_OF_TESTS: Final[float]
 LONGEST_DELAY: Final[float]
 MOST_NUMBERS: Final[int]
-SHORTEST_LAG: Final[float]
 
 @final
 class FamilyCandidate:
@@ -970,12 +963,12 @@ class FamilyFit:
 def fit_family(
     records: Sequence[tuple[_Reals, _Reals, _Reals, int, _Reals | None, float]],
     *,
-    kind: str = "held",
-    controller: bool = False,
+    between: str = "held",
+    closed_loop: bool = False,
     at_rest: bool | None = None,
     largest_delay: float | None = None,
     plant: str | None = None,
-    integrating: bool | None = None,
+    integrates: bool | None = None,
     noise: str | None = None,
     level: float = 0.95,
     causes: bool = False,
@@ -1079,15 +1072,15 @@ class ChebyshevMisfit:
         output: _Reals,
         steps: Sequence[_Pair],
         *,
-        known: tuple[float, float, float, float],
-        places: Sequence[int | None],
+        names: Sequence[str],
+        known: Mapping[str, float],
         start: float | None,
         intervals: int,
         is_late: bool,
         units: Sequence[float],
     ) -> ChebyshevMisfit: ...
 
-_LineNumbers: TypeAlias = tuple[Sequence[float], Sequence[int | None], float]
+_LineNumbers: TypeAlias = tuple[Sequence[str], Mapping[str, float], float]
 
 @final
 class LinesMisfit:
@@ -1117,10 +1110,10 @@ class CommandedMisfit:
         commands: tuple[_Reals, _Reals],
         *,
         plant: tuple[Sequence[float], Sequence[float]] | None,
-        is_lag: bool,
+        slow: str,
         is_limited: bool,
-        known: Sequence[float],
-        places: Sequence[int | None],
+        names: Sequence[str],
+        known: Mapping[str, float],
         start: float | None,
     ) -> CommandedMisfit: ...
 
@@ -1164,11 +1157,7 @@ class _FittedPart(Protocol):
     @property
     def length(self) -> int: ...
     @property
-    def low(self) -> _Reals: ...
-    @property
-    def high(self) -> _Reals: ...
-    @property
-    def axes(self) -> list[list[float]]: ...
+    def every_end(self) -> Sequence[tuple[float, float, Sequence[float]]]: ...
 
 @final
 class LeastSquaresMinimum:
@@ -1186,18 +1175,14 @@ class LeastSquares:
         cls,
         parts: Sequence[_FittedPart],
         weights: Sequence[float],
-        common: int,
-        delay: int | None,
-        lag: int | None,
+        names: Sequence[str],
     ) -> LeastSquares: ...
     def bounds(self) -> tuple[_Reals, _Reals]: ...
     def misfit(self, point: _Reals) -> _Reals: ...
     def jacobian(self, point: _Reals) -> _Reals: ...
     def solve(self) -> LeastSquaresMinimum: ...
     def by_scatter(self, first: LeastSquaresMinimum) -> tuple[list[float], LeastSquaresMinimum]: ...
-    def without_vanishing(
-        self, found: LeastSquaresMinimum, delay: int | None, lag: int | None, size: float
-    ) -> LeastSquaresMinimum: ...
+    def without_vanishing(self, found: LeastSquaresMinimum, size: float) -> LeastSquaresMinimum: ...
     def least_held(
         self, best: LeastSquaresMinimum, places: Sequence[int], value: float
     ) -> float: ...
@@ -1206,7 +1191,7 @@ class LeastSquares:
         self, readings: RoundedReadings, peak: RoundedPeak, places: Sequence[int], value: float
     ) -> float: ...
     def scan(
-        self, delays: _Reals, guess: _Reals, lag: int | None, rounding: float
+        self, delays: _Reals, guess: _Reals, rounding: float
     ) -> tuple[_Reals, list[int], LeastSquaresMinimum]: ...
 
 _Peak: TypeAlias = tuple[float, float, float, float]
@@ -1229,16 +1214,23 @@ def x_of_overshoot(overshoot: float) -> float | None: ...
 def rise_tangent(
     since: _Reals, travelled: _Reals, guess: float, held: float | None, noise: float
 ) -> tuple[_Pair | None, tuple[int, float, float] | None]: ...
-def cycle_crossings(time: _Reals, error: _Reals, noise: float) -> _Reals: ...
-def cycle_switches(
-    time: _Reals, signs: _Reals, crossings: _Reals
-) -> tuple[list[int], list[float]]: ...
-def cycle_peaks(time: _Reals, error: _Reals, crossings: _Reals) -> _Reals: ...
-def cycle_path(
-    rows: tuple[_Reals, _Reals, _Reals], switches: _Reals, delay: float, lag: float
-) -> tuple[list[int], _Reals, _Reals, float] | None: ...
-def cycle_delays(crossings: _Reals, switches: _Reals) -> tuple[int, float, float]: ...
-def cycle_delay_by_lag(lag: float, half: float) -> float: ...
+
+@final
+class LimitCycle:
+    def __new__(
+        cls, time: _Reals, output: _Reals, reference: _Reals, noise: float, left_out: int
+    ) -> LimitCycle: ...
+    @property
+    def crossings(self) -> _Reals: ...
+    @property
+    def peaks(self) -> _Reals: ...
+    def switches(self, signs: _Reals) -> tuple[list[int], list[float]]: ...
+    def delays(self, switches: _Reals) -> tuple[int, float, float]: ...
+    def path(
+        self, switches: _Reals, delay: float, lag: float
+    ) -> tuple[list[int], _Reals, _Reals, float] | None: ...
+    @staticmethod
+    def delay_by_lag(lag: float, half: float) -> float: ...
 
 @final
 class PathAt:

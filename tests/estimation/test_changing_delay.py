@@ -11,7 +11,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import OutputError
-from deadtime.estimation.methods import _output_error
+from deadtime.estimation.methods import _flight_conclusion
 from marks import NIGHTLY
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
@@ -21,7 +21,7 @@ from reality.conditions import CONDITIONS, SAMPLE, Condition
 from reality.generator import record
 
 #: What the tests of the kernel say, before they are remembered.
-_adequacy_of = _output_error.adequacy_of
+_adequacy_of = _flight_conclusion.adequacy_of
 
 NAMED = {condition.name: condition for condition in CONDITIONS}
 
@@ -38,7 +38,7 @@ def change_of(condition: Condition, number: int) -> tuple[float, float] | None:
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(run.vehicle.Kp), sample_time=SAMPLE, limit=1.0)
     recording = table.recording_of(condition, run)
     alone = OutputError(rivals=False)  # which would be judged too
-    with mock.patch.object(_output_error, "adequacy_of", remembered):
+    with mock.patch.object(_flight_conclusion, "adequacy_of", remembered):
         dtm.estimate_delay(recording, loop, method=alone, free=("delay", "gain"))
     found = [one for last in judged[-1:] for one in last.findings if one.cause == "change"]
     return (found[0].p_value, found[0].sizes[0]) if found else None

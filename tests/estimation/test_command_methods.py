@@ -5,9 +5,13 @@ import numpy as np
 import pytest
 from deadtime.estimation import GCC, ARXScan
 from deadtime.estimation._native import HeldResponse
-from deadtime.estimation.data._input_output import FEEDBACK, feedback_p_value
 from deadtime.estimation.data._simulated import commands_over_samples
-from deadtime.estimation.methods._arx_scan import F_TEST_LEVEL, _check_response
+from deadtime.estimation.methods._input_output import (
+    F_TEST_LEVEL,
+    FEEDBACK,
+    _check_loss,
+    feedback_p_value,
+)
 from hypothesis import given, settings, strategies as st
 from scipy.optimize import brentq
 from scipy.stats import kstest
@@ -212,9 +216,9 @@ def test_the_significance_of_the_command_has_a_closed_form():
     half = freedom / 2.0
     four = brentq(lambda x: x**half * (1.0 + half * (1.0 - x)) - F_TEST_LEVEL, 1e-6, 1.0)
     for tested, share in ((2, two), (4, four)):
-        _check_response(0.999 * none * share, none, freedom, tested)
+        _check_loss(0.999 * none * share, none, freedom, tested)
         with pytest.raises(dtm.NotIdentifiableError, match="as it does for noise"):
-            _check_response(1.001 * none * share, none, freedom, tested)
+            _check_loss(1.001 * none * share, none, freedom, tested)
 
 
 def test_options_are_checked():

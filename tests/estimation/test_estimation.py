@@ -20,9 +20,9 @@ from deadtime.estimation import (
     Waveform,
 )
 from deadtime.estimation._estimate import METHODS
+from deadtime.estimation._least_squares import whiteness_of
 from deadtime.estimation._native import LeastSquaresMinimum
-from deadtime.estimation.fit._residuals import whiteness_of
-from deadtime.estimation.methods._overshoot import dominant_x, exact_x
+from deadtime.estimation.methods._step_response import dominant_x, exact_x
 from hypothesis import given, settings, strategies as st
 from scipy.signal import lfilter
 

@@ -57,7 +57,7 @@ def test_units_change_nothing():
     record = made.height_steps(1)
     found = fit(record)
     in_hours = fit_rows(
-        record.time / 3600.0, 100.0 * record.command, 1000.0 * record.output, controller=True
+        record.time / 3600.0, 100.0 * record.command, 1000.0 * record.output, closed_loop=True
     )
     assert in_hours.candidates[0].plant == found.candidates[0].plant
     assert in_hours.verdict == found.verdict
@@ -81,7 +81,7 @@ def test_a_signal_behind_a_delay_alone():
     random = np.random.default_rng(0)
     command = random.normal(size=200).cumsum()
     output = np.r_[np.zeros(6), command[:-6]] + random.normal(0.0, 0.01, 200)
-    found = fit_rows(np.arange(200) * 0.1, command, output, kind="samples")
+    found = fit_rows(np.arange(200) * 0.1, command, output, between="samples")
     assert found.candidates[0].plant == "delay"
     assert holds(found.hull["delay"], 0.6)
 
@@ -102,7 +102,7 @@ def test_a_command_that_is_logged_late_is_moved():
 
 def test_a_command_of_unknown_kind_has_the_intervals_of_both():
     record = made.height_steps(2)
-    kinds = {kind: fit(record, kind=kind) for kind in ("held", "straight", "undecided")}
+    kinds = {kind: fit(record, between=kind) for kind in ("held", "straight", "undecided")}
     both = kinds["undecided"]
     if not both.kind_decided:
         parts = [kinds[kind].hull["delay"] for kind in ("held", "straight")]
@@ -114,7 +114,7 @@ def test_a_command_of_unknown_kind_has_the_intervals_of_both():
 
 def test_a_command_of_a_controller_is_held_where_its_kind_is_as_likely():
     record = made.height_steps(60018)
-    kinds = {kind: fit(record, kind=kind) for kind in ("held", "straight", "undecided")}
+    kinds = {kind: fit(record, between=kind) for kind in ("held", "straight", "undecided")}
     held, straight, both = (kinds[kind].candidates[0] for kind in kinds)
     assert held.deviance - 2.0 < straight.deviance < held.deviance
     assert kinds["undecided"].kind == "held"
@@ -127,13 +127,13 @@ def test_a_command_that_ramps_is_straight_where_its_kind_is_as_likely():
     acting = np.interp(time - 12.3, time, command)
     _, output, _ = signal.lsim(([1.8], [40.0, 1.0]), acting, time)
     output += np.random.default_rng(1).normal(0.0, 0.3, time.size)
-    found = fit_rows(time, command, output, kind="undecided")
+    found = fit_rows(time, command, output, between="undecided")
     assert (found.kind, found.kind_decided) == ("straight", False)
 
 
 def test_a_command_that_jumps_is_held():
     record = made.slow_window(3)
-    found = fit(record, kind="undecided")
+    found = fit(record, between="undecided")
     assert (found.kind, found.kind_decided) == ("held", True)
     held = fit(record)
     assert found.hull == held.hull
@@ -142,7 +142,7 @@ def test_a_command_that_jumps_is_held():
 def test_no_zero_imitates_another_kind():
     time, command, output = table(PROCESS / "loop.csv", "Time (s)", "OP", "PV")
     part = time < 600.0
-    found = fit_rows(time[part], command[part], output[part] + 0.01 * time[part], controller=True)
+    found = fit_rows(time[part], command[part], output[part] + 0.01 * time[part], closed_loop=True)
     best = found.candidates[0]
     for one in found.candidates:
         zero = dict(zip(one.names, one.values, strict=True)).get("zero", 0.0)
@@ -200,7 +200,7 @@ def test_noise_alone_is_no_response():
         ({"output": np.full(40, np.nan)}, "only 0 rows with a known output"),
         ({"largest_delay": -1.0}, "the largest delay is -1"),
         ({"plant": "lags"}, 'plant "lags" is not known'),
-        ({"kind": "steps"}, 'kind "steps"'),
+        ({"between": "steps"}, 'kind "steps"'),
         ({"level": 2.0}, "the level is 2"),
     ],
 )
@@ -221,7 +221,7 @@ def test_the_bump_test_of_a_process():
 
 def test_a_process_in_a_loop_with_a_step_of_the_load():
     rows = table(PROCESS / "loop.csv", "Time (s)", "OP", "PV")
-    found = fit_rows(*rows, controller=True)
+    found = fit_rows(*rows, closed_loop=True)
     assert found.verdict in ("reliable", "indication")
     # A zero of the length of the record would make an integrator of it.
     assert not found.candidates[0].integrating
@@ -247,7 +247,7 @@ def test_one_step_does_not_tell_two_lags_from_a_dead_time():
 @pytest.mark.parametrize("kind", ["held", "samples"])
 def test_a_masked_sine_is_never_reliable(kind):
     rows = table(PROCESS / "lagd_masked.csv", "t", "u", "y")
-    assert fit_rows(*rows, kind=kind).verdict != "reliable"
+    assert fit_rows(*rows, between=kind).verdict != "reliable"
 
 
 @pytest.mark.parametrize(("name", "gain"), [("0_5_1_0", 0.5), ("2_4_0_25", 2.4)])
@@ -257,7 +257,7 @@ def test_the_servo_of_a_recorded_height_is_found(name, gain):
     used = time <= 25.5
     command = np.clip(gain * (reference - height), -1.0, 1.0)
     found = fit_rows(
-        time[used], command[used], height[used], controller=True, earlier=int(np.sum(time < 13.0))
+        time[used], command[used], height[used], closed_loop=True, earlier=int(np.sum(time < 13.0))
     )
     best, second = found.candidates[:2]
     assert best.plant == "integrator, two lags, zero"

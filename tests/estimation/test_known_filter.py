@@ -6,7 +6,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import OutputError
-from deadtime.estimation.data._known_filter import known_filter
+from deadtime.estimation.methods._commanded_model import known_filter
 from hypothesis import given, strategies as st
 from marks import NIGHTLY
 from scipy import signal

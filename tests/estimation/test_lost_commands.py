@@ -7,8 +7,8 @@ from pathlib import Path
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime.estimation._least_squares import whiteness_of
 from deadtime.estimation._native import LEVEL_OF_TESTS
-from deadtime.estimation.fit._residuals import whiteness_of
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
 

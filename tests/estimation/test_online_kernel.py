@@ -14,8 +14,8 @@ from deadtime._deadtime import (
     PlantNumbers,
     RowNoise,
 )
-from deadtime.estimation.likelihood._disturbances import Disturbance
-from deadtime.estimation.running._settings import BankSettings
+from deadtime.estimation._plant import Disturbance
+from deadtime.estimation.running._bank import BankSettings
 
 WHITE, AIR, AIR_TIME, SENSOR, SENSOR_TIME = 0.006, 0.08, 0.9, 0.004, 0.2
 DELAYS = [0.27, 0.285, 0.3, 0.312, 0.33]
@@ -26,10 +26,7 @@ def settings(**changed):
     """A bank without walk, jumps and an unknown scale."""
     count = len(changed.get("delays", DELAYS))
     given = {
-        "num": (1.0,),
-        "den": (1.0, 0.0),
-        "air_behind_lags": True,
-        "own_lag": 0.0,
+        "plant": FlightPlant([1.0], [1.0, 0.0], [], [], [], air_behind_lags=True),
         "delays": DELAYS,
         "follow": False,
         "layers": [([0.15], 0.0, [0.0] * count)],
@@ -198,7 +195,10 @@ def test_what_is_wrong_is_said_with_its_value():
         ({"level": 1.0}, "the level is 1"),
         ({"layers": [([-0.1], 0.0, [0.0] * 5)]}, "a lag is -0.1 s"),
         ({"layers": [([0.1], 0.0, [-math.inf] * 5)]}, "all prior weights are zero"),
-        ({"den": (1.0, *[0.0] * 7)}, "the filters can use at most 9"),
+        (
+            {"plant": FlightPlant([1.0], [1.0, *[0.0] * 7], [], [], [])},
+            "the filters can use at most 9",
+        ),
     ):
         with pytest.raises(ValueError, match=words):
             OnlineBank(settings(**changed))

@@ -5,8 +5,8 @@ from dataclasses import replace
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime.estimation.data._stamps import on_regular_times
 from deadtime.estimation.methods._method import Run
+from deadtime.estimation.methods._output_error import on_regular_times
 from marks import NIGHTLY
 
 SAMPLE, DELAY, GAIN = 0.065, 0.3, 0.85

@@ -4,7 +4,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 import step_recordings
-from deadtime.estimation.fit._least_squares import JointModel
+from deadtime.estimation._least_squares import JointModel
 from flights import flight_path
 
 TS = 0.065

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from deadtime.estimation.fit._residuals import whiteness_of
+from deadtime.estimation._least_squares import whiteness_of
 from scipy import stats
 
 

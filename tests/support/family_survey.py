@@ -32,7 +32,7 @@ def fit_rows(time, command, output, earlier=0, **options):
 
 def fit(record, **options):
     rows = (record.time, record.command, record.output)
-    return fit_rows(*rows, controller=record.in_loop, **options)
+    return fit_rows(*rows, closed_loop=record.in_loop, **options)
 
 
 def name_of(record):

@@ -8,8 +8,8 @@ while the loop runs. Each method is a class that holds its options.
 
 # The files. `_estimate` chooses and runs a method, `_compare` runs several, `_choose` tries several
 # plants, `_result` is what they return, `_shared` combines several. `evidence` finds the plant of a
-# recording without a loop. `methods` holds one file a method, `data` what they read from a
-# recording, `fit` least squares, profiles and residuals, `likelihood` plant and noise as the kernel
+# recording without a loop. `methods` holds the methods, `data` what they read from a
+# recording, `_least_squares` models, profiles and residuals, `_plant` plant and noise as the kernel
 # takes them, `planning` the bounds of planned experiments, `running` what is estimated while a loop
 # runs.
 
@@ -32,6 +32,7 @@ from deadtime.estimation._estimate import (
     automatic_method as automatic_method,
     estimate_delay,
 )
+from deadtime.estimation._least_squares import Whiteness
 from deadtime.estimation._plots import (
     estimate_axes as estimate_axes,
     plot_estimate as plot_estimate,
@@ -39,38 +40,30 @@ from deadtime.estimation._plots import (
 )
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation._shared import SharedNumber, shared_number
-from deadtime.estimation.evidence._candidate import PlantCandidate
-from deadtime.estimation.evidence._causes import Cause, SensorFault
-from deadtime.estimation.evidence._estimate import PlantEstimate
+from deadtime.estimation.evidence._estimate import Advice, PlantEstimate
 from deadtime.estimation.evidence._find import refit as refit
+from deadtime.estimation.evidence._found import Cause, PlantCandidate, SensorFault
 from deadtime.estimation.evidence._numbers import FittedRecording, LoopView
 from deadtime.estimation.evidence._question import PLANTS as PLANTS
-from deadtime.estimation.evidence._words import Advice
-from deadtime.estimation.fit._residuals import Whiteness
-from deadtime.estimation.likelihood._judgement import unseen_in_words as unseen_in_words
-from deadtime.estimation.methods._arx_scan import ARXScan
-from deadtime.estimation.methods._cta import CTA
-from deadtime.estimation.methods._decay import Decay
-from deadtime.estimation.methods._decrement import Decrement
+from deadtime.estimation.methods._flight_conclusion import unseen_in_words as unseen_in_words
 from deadtime.estimation.methods._frequency import Frequency
-from deadtime.estimation.methods._gcc import GCC
-from deadtime.estimation.methods._graphical import Graphical
-from deadtime.estimation.methods._grid import Grid
+from deadtime.estimation.methods._input_output import GCC, ARXScan
 from deadtime.estimation.methods._method import Method
+from deadtime.estimation.methods._oscillation import Decay, Decrement, Relay
 from deadtime.estimation.methods._output_error import OutputError
-from deadtime.estimation.methods._overshoot import (
+from deadtime.estimation.methods._step_response import (
+    Graphical,
     Overshoot,
     OvershootMap as OvershootMap,
     damping_ratio,
     dominant_x as dominant_x,
     exact_x as exact_x,
 )
-from deadtime.estimation.methods._relay import Relay
-from deadtime.estimation.methods._waveform import NoisePath as NoisePath, Waveform
+from deadtime.estimation.methods._waveform import CTA, Grid, NoisePath as NoisePath, Waveform
 from deadtime.estimation.planning._identifiability import Identifiability, identifiability
 from deadtime.estimation.planning._monte_carlo import MonteCarlo
 from deadtime.estimation.planning._planned_bound import PlannedBound
-from deadtime.estimation.running._estimate import OnlineEstimate
+from deadtime.estimation.running._bank import OnlineEstimate
 from deadtime.estimation.running._estimator import OnlineEstimator
 from deadtime.estimation.running._track import DelayTrack, online
 

@@ -141,15 +141,13 @@ class PlantChoice(ReadOnlyArrays):
 
     def remarks(self) -> list[str]:
         """What the table means, in sentences."""
-        found = ["BIC is less that of the likeliest plant; * was taken; times in s."]
-        if self.best.verdict != "reliable":
-            found.append("None of the plants that were tried gives a reliable estimate.")
-            return found
-        found.append(
-            "Sum of delay and lag, averaged over all plants by their "
-            f"probabilities: {between(*self.ci(), math.nan, 's')} (95 %)."
-        )
-        return found
+        found = "None of the plants that were tried gives a reliable estimate."
+        if self.best.verdict == "reliable":
+            found = (
+                "Sum of delay and lag, averaged over all plants by their "
+                f"probabilities: {between(*self.ci(), math.nan, 's')} (95 %)."
+            )
+        return ["BIC is less that of the likeliest plant; * was taken; times in s.", found]
 
     def to_dict(self) -> dict[str, Any]:
         """All results but the arrays, as plain values for JSON."""
@@ -266,14 +264,13 @@ def choose_plant(
             with_zero = shares is ZEROS
             label = f"{name}{', zero' * with_zero}"
             free = ["delay", *(key for key in plant.parameters if with_zero or key != "zero")]
+            options: dict[str, Any] = {"method": chosen, "free": free, "window": window}
             fits = []
             for share in shares:
                 started = replace(plant, zero=share * size)
                 known = [control_loop.replace(plant=started) for control_loop in loops]
                 try:
-                    fits.append(
-                        estimate_delay(recording, known, method=chosen, free=free, window=window)
-                    )
+                    fits.append(estimate_delay(recording, known, **options))
                 except NotIdentifiableError as error:
                     refusals[label] = str(error)
             if fits:

@@ -12,13 +12,12 @@ import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError, RecordingError
 from deadtime._base.validation import OpenRange
-from deadtime.estimation._estimate import METHODS, checked_run
-from deadtime.estimation._findings import bound
+from deadtime.estimation._estimate import METHODS, bound, checked_run
 from deadtime.estimation._native import independent_samples
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.evidence._rival import beside_rivals
 from deadtime.estimation.methods._method import paired_runs
-from deadtime.estimation.methods._overshoot import Overshoot, OvershootMap
+from deadtime.estimation.methods._step_response import Overshoot, OvershootMap
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
@@ -120,14 +119,19 @@ class Comparison:
         Bayesian information criterion favours it, for the number of independent samples that the
         autocorrelation of the residuals gives; otherwise the fit of delay and gain.
         """
+        return self.estimates[self._name_of_best]
+
+    @property
+    def _name_of_best(self) -> str:
         plain, lagged = self._fits()
+        with_lag = f"{self.trusted} with lag"
         if lagged is None or lagged.ci(0.95, "lag")[0] <= 0.0:
-            return plain
+            return self.trusted
         if lagged.noise is not None:  # the interval is that of the likelihood
-            return lagged
+            return with_lag
         effective = independent_samples(lagged.residuals.size, lagged.whiteness.autocorrelation)
         gain = 2.0 * effective * np.log(plain.rms / lagged.rms) if lagged.rms > 0 else np.inf
-        return lagged if gain > np.log(max(effective, 2.0)) else plain
+        return with_lag if gain > np.log(max(effective, 2.0)) else self.trusted
 
     def _fits(self) -> tuple[DelayEstimate, DelayEstimate | None]:
         """The trusted fit of delay and gain, and the one with a lag, if there is one."""
@@ -155,18 +159,21 @@ class Comparison:
 
     def limitations(self) -> list[str]:
         """On which rows, by how much and why the methods without an interval are off."""
-        best = self.best
-        reference = next(name for name, fit in self.estimates.items() if fit is best)
+        reference = _label(self._name_of_best)
         sentences: list[str] = []
         for name, gap in self.differences().items():
             if not gap.limits:
                 continue
             label = _label(name)
             said = any(gap.limits in sentence for sentence in sentences)
+            side = "more than" if gap.seconds >= 0.0 else "less than"
+            errors = ""
+            if gap.standard_errors is not None:
+                errors = f" ({abs(gap.standard_errors):.2g} standard errors of this difference)"
             sentences.append(
                 f"{label[0].upper()}{label[1:]}, on {gap.rows} rows from {gap.window[0]:g} to "
-                f"{gap.window[1]:g} s: {abs(gap.seconds):.3f} s {_side(gap)} {_label(reference)}"
-                f"{_in_errors(gap)}.{'' if said else f' {gap.limits}'}"
+                f"{gap.window[1]:g} s: {abs(gap.seconds):.3f} s {side} {reference}{errors}."
+                f"{'' if said else f' {gap.limits}'}"
             )
         return sentences
 
@@ -237,32 +244,13 @@ class Comparison:
 
 def truth_row(numbers: Mapping[str, float]) -> list[str]:
     """The true parameters of a simulated run, as a further row of `Comparison.rows`."""
-    return [
-        "the truth",
-        f"{numbers['delay']:.3f}",
-        "",
-        f"{numbers['gain']:.3f}",
-        f"{numbers['lag']:.3f}",
-        f"{numbers['delay+lag']:.3f}",
-        "",
-        "",
-        "",
-    ]
+    names = ("delay", "gain", "lag", "delay+lag")
+    delay, *others = (f"{numbers[name]:.3f}" for name in names)
+    return ["the truth", delay, "", *others, "", "", ""]
 
 
 def _label(name: str) -> str:
     return LABELS.get(name, name.replace("_", " "))
-
-
-def _side(gap: MethodDifference) -> str:
-    return "more than" if gap.seconds >= 0.0 else "less than"
-
-
-def _in_errors(gap: MethodDifference) -> str:
-    """A difference in standard errors, in brackets."""
-    if gap.standard_errors is None:
-        return ""
-    return f" ({abs(gap.standard_errors):.2g} standard errors of this difference)"
 
 
 def _signed(value: float | None) -> str:
@@ -325,10 +313,8 @@ def compare_methods(
     runs = [checked_run(run) for run in paired_runs(recording, loop, window)]
     estimates: dict[str, DelayEstimate] = {}
     refusals: dict[str, str] = {}
-    named: list[str] = [
-        name for name in ("delay", "gain", "lag") if name in (*loop.parameters, "delay")
-    ]
-    plain = [name for name in named if name != "lag"]
+    plain = ["delay", *(["gain"] if "gain" in loop.parameters else [])]
+    named = [*plain, *(["lag"] if "lag" in loop.parameters else [])]
     for name in get_args(OvershootMap):
         try:
             estimates[name] = Overshoot(map=name).estimate(runs, plain)
@@ -342,10 +328,9 @@ def compare_methods(
             estimates[name] = METHODS[name]().estimate(runs, plain)
     fits = FITS if recording.command is not None else FITS[:1]
     for fit in fits:
-        frees = {fit: plain}
-        if named != plain:
-            frees[f"{fit} with lag"] = named
-        for name, free in frees.items():
+        for name, free in {fit: plain, f"{fit} with lag": named}.items():
+            if name != fit and named == plain:
+                continue
             try:
                 found = METHODS[fit]().estimate(runs, free)
                 estimates[name] = bound(found, runs, of_loop=fit == "waveform")
@@ -353,7 +338,6 @@ def compare_methods(
                 refusals[name] = str(error).rstrip(".")
     if not any(name in estimates for name in fits):
         raise NotIdentifiableError(refusals["waveform"])
-    best = Comparison(estimates, refusals).best
-    name = next(name for name, estimate in estimates.items() if estimate is best)
-    best = beside_rivals(best, runs[0], METHODS[best.method]())
+    name = Comparison(estimates, refusals)._name_of_best
+    best = beside_rivals(estimates[name], runs[0], METHODS[estimates[name].method]())
     return Comparison(estimates | {name: best}, refusals)

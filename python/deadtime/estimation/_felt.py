@@ -13,9 +13,9 @@ G is that of the continuous plant with its dead time, without a hold, as in `Pla
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,12 +61,12 @@ def seen(loop: ControlLoop, omega: ArrayLike) -> Array:
 def limits(loop: ControlLoop) -> tuple[float, float]:
     """Largest stable proportional gain around the plant, and where half of it crosses over.
 
-    Infinite and NaN where no gain is largest.
+    Infinite and NaN where no gain is largest; both NaN for a plant that limits rates.
     """
-    around = loop.plant.transfer_function()
-    gain = loop.parameters.get("gain", 1.0)
-    sign = -1.0 if gain is not None and gain < 0.0 else 1.0
-    late = sign * around * delay(loop.delay or 0.0)
+    if not loop.plant.is_linear:
+        return math.nan, math.nan
+    sign = -1.0 if loop.parameters.get("gain", 1.0) < 0.0 else 1.0
+    late = sign * loop.plant.transfer_function() * delay(loop.delay or 0.0)
     found = late.margin()
     largest = min(found.gain_margins[found.phase_crossovers > 0.0].tolist(), default=math.inf)
     if not math.isfinite(largest):
@@ -89,18 +89,16 @@ def highest_excited(recording: Recording, loop: ControlLoop) -> float:
 class Felt(AtCrossover):
     """What a loop feels of the plant of an estimate: part of `DelayEstimate`."""
 
-    if TYPE_CHECKING:
-        loop: ControlLoop
-        free: tuple[str, ...]
-        cov: Array
-        uncalibrated: str
+    loop: ControlLoop
+    free: tuple[str, ...]
+    cov: Array
 
-        def quantile(self, level: float) -> float: ...
+    @abstractmethod
+    def quantile(self, level: float) -> float:
+        """That of Student's distribution that goes with the standard errors at a level."""
 
     @cached_property
     def _limits(self) -> tuple[float, float]:
-        if not self.loop.plant.is_linear:
-            return math.nan, math.nan
         return limits(self.loop)
 
     @property
@@ -154,10 +152,8 @@ class Felt(AtCrossover):
                 "no gain or phase"
             )
         size, phase, late = seen(self.loop, given)
-        ends = np.array(self._ends(lambda loop: seen(loop, given), level))
-        return LoopView(
-            given, np.exp(size), phase, late, np.exp(ends[:, 0]), ends[:, 1], ends[:, 2]
-        )
+        sizes, *others = np.swapaxes(self._ends(lambda loop: seen(loop, given), level), 0, 1)
+        return LoopView(given, np.exp(size), phase, late, np.exp(sizes), *others)
 
     @cached_property
     def _at_crossover(self) -> tuple[float, float, float]:
@@ -200,16 +196,13 @@ class Felt(AtCrossover):
 def _moved(loop: ControlLoop, steps: Mapping[str, float]) -> ControlLoop:
     """The loop with its numbers moved; times stay at zero or above, and the gain keeps its sign."""
     found = {}
-    for name, step in steps.items():
-        if name not in loop.parameters:
-            continue
-        value = loop.parameters[name]
-        new = value + step
+    for name in steps.keys() & loop.parameters.keys():
+        value, step = loop.parameters[name], steps[name]
+        found[name] = value + step
         if name == "gain":
-            new = value * math.exp(step / value)
+            found[name] = value * math.exp(step / value)
         elif name.startswith(("delay", "lag")):
-            new = max(new, 0.0)
-        elif name == "time_constant" or name.startswith("pole_"):
-            new = max(new, LEAST * value)
-        found[name] = new
+            found[name] = max(found[name], 0.0)
+        elif name.startswith(("time_constant", "pole_")):
+            found[name] = max(found[name], LEAST * value)
     return loop.replace(**found)

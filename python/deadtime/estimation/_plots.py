@@ -7,21 +7,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from deadtime._base.drawing import (
-    COLOURS,
-    DATA,
-    REFERENCE,
-    Axes,
-    Figure,
-    bare_axes,
-    check_matplotlib,
-)
+import deadtime._base.drawing as drawing
+from deadtime._base.drawing import REFERENCE, Axes, Figure
 from deadtime.estimation._result import DelayEstimate, FittedRun
 from deadtime.recordings import Recording
 
 if TYPE_CHECKING:
     from deadtime.estimation.planning._identifiability import Identifiability
-    from deadtime.estimation.planning._planned_bound import PlannedBound
 
 #: Half axis of the ellipse that holds 95 % of two Gaussian errors, in standard deviations.
 TWO_DIMENSIONS = float(np.sqrt(-2.0 * np.log(0.05)))
@@ -32,7 +24,7 @@ def plot_fits(
 ) -> Axes:
     """Draw the recorded output with the fitted ones over it."""
     _draw_recorded(ax, recording)
-    for colour, (label, fit) in zip(COLOURS, fits.items(), strict=False):
+    for colour, (label, fit) in zip(drawing.COLOURS, fits.items(), strict=False):
         window = fit.recording
         ax.plot(window.time, window.output - fit.residuals, color=colour, lw=1.6, label=label)
     ax.set(xlabel="time / s", ylabel=f"output / {unit}")
@@ -76,12 +68,12 @@ def _check_axes(axes: Sequence[Axes], count: int) -> None:
     if len(axes) != count:
         raise ValueError(f"ax has {len(axes)} axes: give {count} matplotlib axes")
     for ax in axes:
-        bare_axes(ax)
+        drawing.bare_axes(ax)
 
 
 def shown_figure(width: float, height: float) -> Figure:
     """A new figure of pyplot."""
-    check_matplotlib()
+    drawing.check_matplotlib()
     from matplotlib import pyplot
 
     return pyplot.figure(figsize=(width, height), layout="constrained")
@@ -89,7 +81,7 @@ def shown_figure(width: float, height: float) -> Figure:
 
 def _draw_recorded(ax: Axes, recording: Recording) -> None:
     ax.step(recording.time, recording.reference, where="post", label="reference", **REFERENCE)
-    ax.plot(recording.time, recording.output, label="recorded", **DATA)
+    ax.plot(recording.time, recording.output, label="recorded", **drawing.DATA)
 
 
 def _has_profile(fit: DelayEstimate) -> bool:
@@ -100,8 +92,8 @@ def _plot_run(upper: Axes, lower: Axes, run: FittedRun, label: str) -> None:
     recording = run.recording
     _draw_recorded(upper, recording)
     fitted = recording.output - run.residuals
-    upper.plot(recording.time, fitted, color=COLOURS[0], lw=1.6, label=label)
-    lower.plot(recording.time, run.residuals, **DATA)
+    upper.plot(recording.time, fitted, color=drawing.COLOURS[0], lw=1.6, label=label)
+    lower.plot(recording.time, run.residuals, **drawing.DATA)
     lower.axhline(0.0, color="0.6", lw=0.8)
     lower.set(xlabel="time / s")
 
@@ -109,10 +101,10 @@ def _plot_run(upper: Axes, lower: Axes, run: FittedRun, label: str) -> None:
 def _plot_profile(ax: Axes, fit: DelayEstimate) -> None:
     """The profile t over the delay, with the 95 % interval where it crosses 1.96."""
     values, t = fit.profile("delay")
-    ax.plot(values, t, color=COLOURS[0], lw=1.6)
+    ax.plot(values, t, color=drawing.COLOURS[0], lw=1.6)
     for end in fit.ci(0.95):
         ax.axvline(end, **REFERENCE)
-    ax.axvline(fit.delay, color=COLOURS[1], lw=1.0)
+    ax.axvline(fit.delay, color=drawing.COLOURS[1], lw=1.0)
     ax.axhline(1.96, color="0.6", lw=0.8, ls=":")
     ax.set(xlabel="delay / s", ylabel="t", ylim=(0.0, None), title="profile, and 95 % interval")
     ax.title.set_fontsize("small")
@@ -155,9 +147,11 @@ def _draw_recording(ax: Axes, plan: Identifiability) -> None:
 def _draw_slopes(ax: Axes, plan: Identifiability) -> None:
     """Effect of an error as large as the bound; similar curves are hard to tell apart."""
     bound = plan.bound
-    for name, colour in zip(plan.free, COLOURS, strict=False):
-        moved = bound.sensitivities[name] * bound.stderr[name] / bound.noise.white
-        ax.plot(plan.recording.time, moved, color=colour, lw=1.2, label=_with_error(bound, name))
+    for name, colour in zip(plan.free, drawing.COLOURS, strict=False):
+        error = bound.stderr[name]
+        moved = bound.sensitivities[name] * error / bound.noise.white
+        shown = f"{error:.2g}" if name == "gain" else f"{1e3 * error:.2g} ms"
+        ax.plot(plan.recording.time, moved, color=colour, lw=1.2, label=f"{name} ({shown})")
     ax.set(xlabel="time (s)", ylabel="change of the output\nin units of the white noise")
     _legend_above(ax, "for one standard error of")
 
@@ -173,19 +167,14 @@ def _legend_above(ax: Axes, title: str) -> None:
     )
 
 
-def _with_error(bound: PlannedBound, name: str) -> str:
-    error = bound.stderr[name]
-    return f"{name} ({error:.2g})" if name == "gain" else f"{name} ({1e3 * error:.2g} ms)"
-
-
 def _draw_ellipse(ax: Axes, plan: Identifiability) -> None:
     """Region of 95 % of the estimates of an efficient method; neither can be below zero."""
     slow = next(name for name in plan.free if name not in ("delay", "gain"))
     centre = np.array([plan.loop.parameters["delay"], plan.loop.parameters[slow]])
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
     circle = np.stack([np.cos(angle), np.sin(angle)])
-    bounds = (("command logged", plan.command_logged), ("reference only", plan.reference_only))
-    for (label, bound), colour in zip(bounds, COLOURS, strict=False):
+    bounds = {"command logged": plan.command_logged, "reference only": plan.reference_only}
+    for (label, bound), colour in zip(bounds.items(), drawing.COLOURS, strict=False):
         if bound is None:
             continue
         places = [bound.free.index("delay"), bound.free.index(slow)]

@@ -15,23 +15,15 @@ from deadtime._base.digits import between, stated
 from deadtime._base.drawing import Axes, Figure, empty_figure
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
+from deadtime._base.plain import plain
 from deadtime._base.validation import confidence, non_negative, real_array
 from deadtime._base.verdicts import NOT_CLAIMED, Verdict, claimed, rough
 from deadtime.estimation._felt import FELT, WORDS, Felt, highest_excited
+from deadtime.estimation._least_squares import Profile, Whiteness, floor_of, unit_of
 from deadtime.estimation._native import FlightProfile
-from deadtime.estimation.fit._profile import Profile, floor_of, unit_of
-from deadtime.estimation.fit._residuals import Whiteness
+from deadtime.estimation._plant import behind_limits
 from deadtime.experiments import FlightNoise
-from deadtime.loops import (
-    Controller,
-    ControlLoop,
-    Explorer,
-    FactoredPlant,
-    Integrator,
-    ParametricPlant,
-    RateLimited,
-    explorer_of,
-)
+from deadtime.loops import Controller, ControlLoop, Explorer, explorer_of
 from deadtime.recordings import Recording
 
 #: What is before the reasons of an indication in its message, and what begins the advice.
@@ -77,6 +69,11 @@ class FittedRun(ReadOnlyArrays):
     loop: ControlLoop
     residuals: Array
     noise: FlightNoise | None = None
+
+
+def of_runs(runs: tuple[FittedRun, ...]) -> dict[str, Any]:
+    """The fields of a `DelayEstimate` that have the runs."""
+    return {**vars(runs[0]), "others": runs[1:]}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -164,12 +161,7 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
         Of a `FactoredPlant` or a `ParametricPlant` the total lag (its ``lag``). Of a plant that
         limits rates, that of the plant after the limits.
         """
-        plant = self.loop.plant
-        if isinstance(plant, RateLimited):
-            plant = plant.plant
-        return (
-            plant.lag if isinstance(plant, (Integrator, FactoredPlant, ParametricPlant)) else None
-        )
+        return getattr(behind_limits(self.loop.plant), "lag", None)
 
     @property
     def delay_plus_lag(self) -> float:
@@ -227,10 +219,7 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
                     f"{name} has no interval, because no proportional gain makes the loop unstable"
                 )
             return self._felt_interval(level, name)
-        if name not in self.stderr:
-            raise ValueError(
-                f"{name!r} was not fitted. There are intervals only for {', '.join(self.stderr)}"
-            )
+        self._check_fitted(name, "intervals")
         value, beside = self._value(name), self._added(name)
         if self._profile is not None and self._profile.preferred:
             low, high = self._profile.interval(name, value, self._reach(name), level)
@@ -309,10 +298,7 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
                 f"the {self.method} method gives no profile "
                 "likelihood. Use method='output_error' or 'waveform'"
             )
-        if name not in self.stderr:
-            raise ValueError(
-                f"{name!r} was not fitted. There are profiles only for {', '.join(self.stderr)}"
-            )
+        self._check_fitted(name, "profiles")
         if values is None:
             middle, reach = self._value(name), 4.0 * self._reach(name)
             low = max(middle - reach, floor_of(name))
@@ -324,6 +310,12 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
             # Of a parabola: its standard error away/t and this one in quadrature.
             found *= np.abs(away) / np.maximum(np.hypot(away, beside * found), 1e-300)
         return held, found
+
+    def _check_fitted(self, name: str, what: str) -> None:
+        """Refuse a quantity of which there are no intervals or profiles."""
+        if name not in self.stderr:
+            names = ", ".join(self.stderr)
+            raise ValueError(f"{name!r} was not fitted. There are {what} only for {names}")
 
     def _value(self, name: str) -> float:
         """The fitted value of a quantity."""
@@ -378,14 +370,10 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
             "lag": self.lag,
             "delay_plus_lag": self.delay_plus_lag,
             "free": list(self.free),
-            "stderr": {
-                name: value if math.isfinite(value) else None for name, value in self.stderr.items()
-            },
-            "interval_95": (
-                {name: list(self.ci(0.95, name)) for name in intervals or self.stderr}
-                if self.calibrated
-                else None
-            ),
+            "stderr": plain(self.stderr),
+            "interval_95": None
+            if self.uncalibrated
+            else {name: list(self.ci(0.95, name)) for name in intervals or self.stderr},
             **{name: getattr(self, name) for name in FELT[:2] + FELT[-1:]},
             "rms": self.rms,
             "white": self.whiteness.white,
@@ -394,7 +382,7 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
             "reason": self.reason,
             "message": self.message,
         }
-        models = [_plain(run.noise) for run in self.runs if run.noise is not None]
+        models = [plain(vars(run.noise)) for run in self.runs if run.noise is not None]
         if models:
             found["noise_model"] = models[0]
         if len(models) > 1:
@@ -559,11 +547,6 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
 def holds_delay(name: str) -> bool:
     """Whether a quantity is the delay, or a sum with it."""
     return "delay" in name.split("+")
-
-
-def _plain(noise: FlightNoise) -> dict[str, float | None]:
-    """The noise for JSON, which has no infinite numbers."""
-    return {name: value if math.isfinite(value) else None for name, value in vars(noise).items()}
 
 
 def bic(fit: DelayEstimate) -> float:

@@ -21,8 +21,8 @@ from deadtime._base.digits import between, shown
 from deadtime._base.plain import plain_fields
 from deadtime._base.validation import confidence
 from deadtime._base.verdicts import Verdict, claimed, verdict_if
+from deadtime.estimation._least_squares import floor_of, unit_of
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.fit._profile import floor_of, unit_of
 
 #: Steps of the grid in the smallest interval, and most of them.
 IN_AN_INTERVAL, ON_THE_GRID = 8, 120
@@ -148,7 +148,6 @@ def shared_number(
         )
     confidence(level)
     ends = [fit.ci(level, name) for fit in estimates]
-    values = [fit._value(name) for fit in estimates]
 
     def total(value: float) -> float:
         return math.fsum(float(fit.profile(name, [value])[1][0]) ** 2 for fit in estimates)
@@ -166,7 +165,7 @@ def shared_number(
         value=best,
         interval=interval,
         level=level,
-        estimates=tuple(values),
+        estimates=tuple(fit._value(name) for fit in estimates),
         p_value=p_value,
         verdict=verdict_if(
             p_value >= native.LEVEL_OF_TESTS and all(fit.verdict == "reliable" for fit in estimates)

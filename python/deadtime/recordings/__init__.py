@@ -1,6 +1,9 @@
 """Recordings of control loops, their checks, and their readers, one file for each format."""
 
 from deadtime.recordings._check import RecordingCheck
+from deadtime.recordings._check_command import (
+    noise_of_second_differences as noise_of_second_differences,
+)
 from deadtime.recordings._check_excitation import (
     no_excitation as no_excitation,
     no_motion as no_motion,

@@ -92,7 +92,7 @@ def read_command(columns: Columns, rows: Rows, loop: ControlLoop) -> Command:
     law, shift = _law_to_rounding(u, clipped, rows.adjacent, tolerance)
     beyond, line = CLEARLY * tolerance, None
     if law is None:
-        noise = abs(controller.Kp) * _noise(columns.output)
+        noise = abs(controller.Kp) * noise_of_second_differences(columns.output)
         law, shift, line, error = _law_but_for_noise(u, wanted, rows.adjacent, noise)
         beyond += BEYOND * error
     if law in ("differs", "unknown"):
@@ -113,9 +113,9 @@ def _share_at(commands: Array | None, limit: float | None) -> float:
     return float(np.mean(np.abs(commands) >= (1.0 - ROUNDING) * limit))
 
 
-def _noise(output: Array) -> float:
-    """Standard deviation of noise from row to row, from the second differences of the output."""
-    return float(np.median(np.abs(np.diff(output, 2)))) / 0.6745 / float(np.sqrt(6.0))
+def noise_of_second_differences(values: Array) -> float:
+    """Standard deviation of the noise on a smooth signal of at least three values."""
+    return float(np.median(np.abs(np.diff(values, 2)))) / 0.6745 / float(np.sqrt(6.0))
 
 
 def _law_to_rounding(

@@ -1,11 +1,14 @@
 //! Bindings of what is fitted to the response of a plant to its commands, and of rounded rows of it.
 
+use std::collections::HashMap;
+
 use deadtime::estimation::{Commanded, Peak, Plant, Readings, UnitPlant};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
 use crate::arrays::{converted, owned};
 use crate::flight::FlightRows;
+use crate::least_squares::places;
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
@@ -19,28 +22,29 @@ pub(crate) struct CommandedMisfit {
 
 #[pymethods]
 impl CommandedMisfit {
-    /// `plant` is num/den of unit gain; without it, an integrator or (`is_lag`) a lag, whose time is
-    /// fitted or known. `known` and `places` are those of delay, gain, this time, and of the limits of
-    /// the rate and of its rate, if there are some.
+    /// `plant` is num/den of unit gain; without it, an integrator, or a lag whose number is
+    /// `time_constant`. `slow` is the name of that number, `names` are those that are fitted, and `known`
+    /// has the others: delay, gain, this time, and the limits of the rate and of its rate.
     #[new]
-    #[pyo3(signature = (time, output, commands, *, plant, is_lag, is_limited, known, places, start))]
+    #[pyo3(signature = (time, output, commands, *, plant, slow, is_limited, names, known, start))]
     #[expect(clippy::too_many_arguments, reason = "keywords of the Python call")]
     fn new(
         time: Floats<'_>,
         output: Floats<'_>,
         commands: (Floats<'_>, Floats<'_>),
         plant: Option<(Vec<f64>, Vec<f64>)>,
-        is_lag: bool,
+        slow: &str,
         is_limited: bool,
-        known: [f64; 5],
-        places: [Option<usize>; 5],
+        names: Vec<String>,
+        known: HashMap<String, f64>,
         start: Option<f64>,
     ) -> PyResult<Self> {
         let plant = match plant {
             Some((num, den)) => UnitPlant::Known(converted(Plant::new(&num, &den))?),
-            None if is_lag => UnitPlant::Lag,
+            None if slow == "time_constant" => UnitPlant::Lag,
             None => UnitPlant::Integrator,
         };
+        let numbers = ["delay", "gain", slow, "rate", "rate_of_rate"];
         Ok(Self {
             inner: Commanded {
                 time: owned(&time)?,
@@ -48,8 +52,8 @@ impl CommandedMisfit {
                 commands: (owned(&commands.0)?, owned(&commands.1)?),
                 plant,
                 is_limited,
-                known,
-                places,
+                known: numbers.map(|name| known.get(name).copied().unwrap_or(f64::INFINITY)),
+                places: places(&names, numbers),
                 start,
             },
         })

@@ -364,7 +364,7 @@ fn named<'py>(py: Python<'py>, all: &[Named]) -> PyResult<Bound<'py, PyDict>> {
     Ok(out)
 }
 
-fn between(kind: &str) -> PyResult<Between> {
+fn named_between(kind: &str) -> PyResult<Between> {
     match kind {
         "held" => Ok(Between::Held),
         "straight" | "samples" => Ok(Between::Straight),
@@ -392,19 +392,19 @@ type Columns<'py> = (
 
 /// Fit the family of plants to records of one plant; with what some of them show, only beside that.
 #[pyfunction]
-#[pyo3(signature = (records, *, kind="held", controller=false, at_rest=None, largest_delay=None,
-    plant=None, integrating=None, noise=None, level=0.95, causes=false, omega=None, progress=None,
+#[pyo3(signature = (records, *, between="held", closed_loop=false, at_rest=None, largest_delay=None,
+    plant=None, integrates=None, noise=None, level=0.95, causes=false, omega=None, progress=None,
     known=None))]
 #[expect(clippy::too_many_arguments, reason = "given by name")]
 pub(crate) fn fit_family(
     py: Python<'_>,
     records: Vec<Columns<'_>>,
-    kind: &str,
-    controller: bool,
+    between: &str,
+    closed_loop: bool,
     at_rest: Option<bool>,
     largest_delay: Option<f64>,
     plant: Option<&str>,
-    integrating: Option<bool>,
+    integrates: Option<bool>,
     noise: Option<&str>,
     level: f64,
     causes: bool,
@@ -426,12 +426,12 @@ pub(crate) fn fit_family(
     let class = plant.map(|name| unknown("plant", name, Class::named(name)));
     let noise = noise.map(|name| unknown("noise", name, FamilyNoise::named(name)));
     let question = Question {
-        between: between(kind)?,
-        in_loop: controller,
+        between: named_between(between)?,
+        in_loop: closed_loop,
         at_rest,
         largest_delay,
         class: class.transpose()?,
-        integrating,
+        integrating: integrates,
         noise: noise.transpose()?,
         level,
         causes,

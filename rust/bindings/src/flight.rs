@@ -6,8 +6,8 @@ use std::sync::Arc;
 use deadtime::Error;
 use deadtime::estimation::{
     Commands, Fit, FlightFit as CoreFit, FlightPlant as CorePlant, FlightRun, LEVEL_OF_TESTS,
-    LONGEST_DELAY, MOST_NUMBERS, Quantity, Rows, RunCommands, SHORTEST_LAG, Scatter, beside_noise,
-    between_rows, first_numbers, fit_numbers, is_long, scatter_of, unseen_lag,
+    LONGEST_DELAY, MOST_NUMBERS, Quantity, Rows, RunCommands, Scatter, beside_noise, between_rows,
+    first_numbers, fit_numbers, is_long, scatter_of, unseen_lag,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
@@ -460,6 +460,5 @@ impl FlightFit {
 pub(crate) fn add_constants(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("LEVEL_OF_TESTS", LEVEL_OF_TESTS)?;
     module.add("LONGEST_DELAY", LONGEST_DELAY)?;
-    module.add("MOST_NUMBERS", MOST_NUMBERS)?;
-    module.add("SHORTEST_LAG", SHORTEST_LAG)
+    module.add("MOST_NUMBERS", MOST_NUMBERS)
 }

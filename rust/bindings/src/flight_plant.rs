@@ -8,14 +8,14 @@ use pyo3::prelude::*;
 #[pyclass(frozen, get_all, from_py_object, module = "deadtime._deadtime")]
 #[derive(Clone)]
 pub(crate) struct FlightPlant {
-    num: Vec<f64>,
-    den: Vec<f64>,
+    pub(crate) num: Vec<f64>,
+    pub(crate) den: Vec<f64>,
     lag_names: Vec<String>,
     lags: Vec<f64>,
     pub(crate) names: Vec<String>,
     zero: f64,
-    own_lag: f64,
-    air_behind_lags: bool,
+    pub(crate) own_lag: f64,
+    pub(crate) air_behind_lags: bool,
 }
 
 #[pymethods]

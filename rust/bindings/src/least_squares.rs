@@ -2,6 +2,8 @@
 //!
 //! Its classes are short, and share what they read from Python and give to it: one file.
 
+use std::collections::HashMap;
+
 use deadtime::estimation::{
     self as core, Chebyshev, ClosedLoop, Fitted, FittedNumber, HeldPath, Joint, Minimum, Part,
     PeriodicLines, Plain, RecordLines, Rounded, Simulated, Vanishing,
@@ -83,17 +85,16 @@ pub(crate) struct ChebyshevMisfit {
 
 #[pymethods]
 impl ChebyshevMisfit {
-    /// `known` are delay, gain, lag and Kp, `places` those of the first three among the numbers that are
-    /// fitted.
+    /// `names` are those of the numbers that are fitted, `known` has gain, lag and Kp.
     #[new]
-    #[pyo3(signature = (time, output, steps, *, known, places, start, intervals, is_late, units))]
+    #[pyo3(signature = (time, output, steps, *, names, known, start, intervals, is_late, units))]
     #[expect(clippy::too_many_arguments, reason = "keywords of the Python call")]
     fn new(
         time: Floats<'_>,
         output: Floats<'_>,
         steps: Vec<(f64, f64)>,
-        known: [f64; 4],
-        places: [Option<usize>; 3],
+        names: Vec<String>,
+        known: HashMap<String, f64>,
         start: Option<f64>,
         intervals: usize,
         is_late: bool,
@@ -104,8 +105,11 @@ impl ChebyshevMisfit {
                 time: owned(&time)?,
                 output: owned(&output)?,
                 steps,
-                known,
-                places,
+                known: ["delay", "gain", "lag", "Kp"].map(|name| match name {
+                    "delay" => 0.0,
+                    _ => known.get(name).copied().unwrap_or(0.0),
+                }),
+                places: places(&names, ["delay", "gain", "lag"]),
                 start,
                 intervals,
                 is_late,
@@ -127,12 +131,21 @@ enum Lines {
     Periodic(PeriodicLines),
 }
 
-/// Delay, gain and lag where they are known, their places among the numbers that are fitted, and the time
-/// between two rows.
-type LineNumbers = ([f64; 3], [Option<usize>; 3], f64);
+/// Names of the numbers that are fitted, delay, gain and lag by name, and the time between two rows.
+type LineNumbers = (Vec<String>, HashMap<String, f64>, f64);
 
-fn plain((known, places, row): LineNumbers) -> Plain {
-    Plain { known, places, row }
+fn plain((names, known, row): LineNumbers) -> Plain {
+    let numbers = ["delay", "gain", "lag"];
+    Plain {
+        known: numbers.map(|name| known.get(name).copied().unwrap_or(0.0)),
+        places: places(&names, numbers),
+        row,
+    }
+}
+
+/// The places of numbers among those that are fitted.
+pub(crate) fn places<const N: usize>(names: &[String], of: [&str; N]) -> [Option<usize>; N] {
+    of.map(|wanted| names.iter().position(|name| name == wanted))
 }
 
 #[pymethods]
@@ -189,9 +202,8 @@ enum Source {
 struct FittedPart<'py> {
     kernel: Bound<'py, PyAny>,
     length: usize,
-    low: Floats<'py>,
-    high: Floats<'py>,
-    axes: Vec<Vec<f64>>,
+    /// Low and high end of each parameter, and its values at the starts.
+    every_end: Vec<(f64, f64, Vec<f64>)>,
 }
 
 /// Misfit and derivatives by methods of an object of Python.
@@ -233,7 +245,9 @@ pub(crate) struct LeastSquares {
     axes: Vec<Vec<Vec<f64>>>,
     weights: Vec<f64>,
     common: usize,
-    trade: Option<(usize, usize)>,
+    /// The places of the delay and of a lag, which acts like it.
+    delay: Option<usize>,
+    lag: Option<usize>,
 }
 
 /// Where a sum of squares is least.
@@ -310,7 +324,7 @@ impl LeastSquares {
             }
         });
         let mut joint = Joint::new(parts.collect(), self.weights.clone(), self.common);
-        joint.trade = self.trade;
+        joint.trade = self.delay.zip(self.lag);
         let found = run_attached(py, |task| work(&mut joint, task));
         calls.ended(found)
     }
@@ -338,13 +352,8 @@ fn polynomials_of<'a>(source: &'a Source, calls: &'a Calls<'_>) -> Option<Finder
 #[pymethods]
 impl LeastSquares {
     #[new]
-    fn new(
-        parts: Vec<FittedPart<'_>>,
-        weights: Vec<f64>,
-        common: usize,
-        delay: Option<usize>,
-        lag: Option<usize>,
-    ) -> PyResult<Self> {
+    fn new(parts: Vec<FittedPart<'_>>, weights: Vec<f64>, names: Vec<String>) -> PyResult<Self> {
+        let [delay, lag] = places(&names, ["delay", "lag"]);
         let mut made = Self {
             sources: Vec::new(),
             sizes: Vec::new(),
@@ -352,8 +361,9 @@ impl LeastSquares {
             high: Vec::new(),
             axes: Vec::new(),
             weights,
-            common,
-            trade: delay.zip(lag),
+            common: names.len(),
+            delay,
+            lag,
         };
         for part in parts {
             made.sources
@@ -369,9 +379,11 @@ impl LeastSquares {
                     Source::Given(part.kernel.unbind())
                 });
             made.sizes.push(part.length);
-            made.low.push(owned(&part.low)?);
-            made.high.push(owned(&part.high)?);
-            made.axes.push(part.axes);
+            let ends = &part.every_end;
+            made.low.push(ends.iter().map(|own| own.0).collect());
+            made.high.push(ends.iter().map(|own| own.1).collect());
+            made.axes
+                .push(part.every_end.into_iter().map(|own| own.2).collect());
         }
         Ok(made)
     }
@@ -417,17 +429,19 @@ impl LeastSquares {
         Ok((weights, LeastSquaresMinimum::of(py, found)?))
     }
 
-    /// The minimum with the delay and the lag (their places) at zero where that fits as well.
+    /// The minimum with the delay and the lag at zero where that fits as well.
     fn without_vanishing(
         &self,
         py: Python<'_>,
         found: &LeastSquaresMinimum,
-        delay: Option<usize>,
-        lag: Option<usize>,
         size: f64,
     ) -> PyResult<LeastSquaresMinimum> {
         let found = self.minimum(py, found)?;
-        let which = Vanishing { lag, delay, size };
+        let which = Vanishing {
+            lag: self.lag,
+            delay: self.delay,
+            size,
+        };
         let found = self.with(py, |joint, task| {
             core::without_vanishing(joint, found, which, task)
         })?;
@@ -493,13 +507,12 @@ impl LeastSquares {
         py: Python<'py>,
         delays: Floats<'_>,
         guess: Floats<'_>,
-        lag: Option<usize>,
         rounding: f64,
     ) -> PyResult<(Vector<'py>, Vec<usize>, LeastSquaresMinimum)> {
         let (delays, guess) = (owned(&delays)?, owned(&guess)?);
         let (costs, found) = self.with(py, |joint, task| {
             let scan = core::scan(joint, &delays, &guess, task)?;
-            let found = core::refined(joint, &scan, lag, rounding, task)?;
+            let found = core::refined(joint, &scan, self.lag, rounding, task)?;
             Ok((scan.costs, found))
         })?;
         let minima = core::local_minima(&costs);

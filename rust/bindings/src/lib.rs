@@ -92,8 +92,7 @@ mod _deadtime {
     };
     #[pymodule_export]
     use super::literature::{
-        HeldResponse, PathAt, arx_losses, correlation_coefficient, correlation_peak,
-        cycle_crossings, cycle_delay_by_lag, cycle_delays, cycle_path, cycle_peaks, cycle_switches,
+        HeldResponse, LimitCycle, PathAt, arx_losses, correlation_coefficient, correlation_peak,
         delay_of_rate, extremes_decay, feedback_test, first_movement, held_losses, line_through,
         loop_of_extremes, rise_tangent, step_extremes, step_tail, x_of_overshoot,
     };

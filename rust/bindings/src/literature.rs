@@ -139,68 +139,88 @@ pub(crate) fn rise_tangent(
     )
 }
 
-/// Crossings of the reference in a limit cycle.
-#[pyfunction]
-pub(crate) fn cycle_crossings<'py>(
-    py: Python<'py>,
-    time: Floats<'_>,
-    error: Floats<'_>,
-    noise: f64,
-) -> PyResult<Vector<'py>> {
-    let found = core::crossings(&in_order(&time)?, &in_order(&error)?, noise);
-    Ok(found.into_pyarray(py))
+/// A limit cycle around the reference.
+#[pyclass(frozen, module = "deadtime._deadtime")]
+pub(crate) struct LimitCycle {
+    time: Vec<f64>,
+    output: Vec<f64>,
+    reference: Vec<f64>,
+    error: Vec<f64>,
+    crossings: Vec<f64>,
 }
 
-/// How often the command switches around each crossing but the last, and the time of one switch with the
-/// same effect.
-#[pyfunction]
-pub(crate) fn cycle_switches(
-    time: Floats<'_>,
-    signs: Floats<'_>,
-    crossings: Floats<'_>,
-) -> PyResult<(Vec<usize>, Vec<f64>)> {
-    let (time, signs) = (in_order(&time)?, in_order(&signs)?);
-    let found = core::switches(&time, &signs, &in_order(&crossings)?);
-    Ok(found.iter().map(|one| (one.count, one.time)).unzip())
-}
+#[pymethods]
+impl LimitCycle {
+    /// That of an output beside noise, after its first crossings.
+    #[new]
+    fn new(
+        time: Floats<'_>,
+        output: Floats<'_>,
+        reference: Floats<'_>,
+        noise: f64,
+        left_out: usize,
+    ) -> PyResult<Self> {
+        let (time, output, reference) = (owned(&time)?, owned(&output)?, owned(&reference)?);
+        let error: Vec<f64> = output.iter().zip(&reference).map(|(y, r)| y - r).collect();
+        let crossings = core::crossings(&time, &error, noise);
+        Ok(Self {
+            crossings: crossings.into_iter().skip(left_out).collect(),
+            time,
+            output,
+            reference,
+            error,
+        })
+    }
 
-/// Largest error between each crossing of a limit cycle and the next.
-#[pyfunction]
-pub(crate) fn cycle_peaks<'py>(
-    py: Python<'py>,
-    time: Floats<'_>,
-    error: Floats<'_>,
-    crossings: Floats<'_>,
-) -> PyResult<Vector<'py>> {
-    let (time, error) = (in_order(&time)?, in_order(&error)?);
-    Ok(core::peaks(&time, &error, &in_order(&crossings)?).into_pyarray(py))
-}
+    /// When the output crosses the reference.
+    #[getter]
+    fn crossings<'py>(&self, py: Python<'py>) -> Vector<'py> {
+        self.crossings.clone().into_pyarray(py)
+    }
 
-/// First and last row of a limit cycle whose switches arrive after a delay, the path of unit speed there and
-/// the output, both about their means, and the speed along the path.
-#[pyfunction]
-#[expect(clippy::type_complexity, reason = "a tuple for Python")]
-pub(crate) fn cycle_path<'py>(
-    py: Python<'py>,
-    rows: (Floats<'_>, Floats<'_>, Floats<'_>),
-    switches: Floats<'_>,
-    delay: f64,
-    lag: f64,
-) -> PyResult<Option<([usize; 2], Vector<'py>, Vector<'py>, f64)>> {
-    let (time, output) = (in_order(&rows.0)?, in_order(&rows.1)?);
-    let (reference, switches) = (in_order(&rows.2)?, in_order(&switches)?);
-    let found = core::cycle_path((&time, &output, &reference), &switches, delay, lag);
-    Ok(found.map(|own| {
-        let ends = [own.rows.start, own.rows.end - 1];
-        let (path, output) = (own.path.into_pyarray(py), own.output.into_pyarray(py));
-        (ends, path, output, own.speed)
-    }))
-}
+    /// Largest error between each crossing and the next.
+    #[getter]
+    fn peaks<'py>(&self, py: Python<'py>) -> Vector<'py> {
+        core::peaks(&self.time, &self.error, &self.crossings).into_pyarray(py)
+    }
 
-/// Increase of a quarter of the period of a limit cycle by a lag.
-#[pyfunction]
-pub(crate) fn cycle_delay_by_lag(lag: f64, half: f64) -> f64 {
-    core::delay_by_lag(lag, half)
+    /// How often the command switches around each crossing but the last, and the time of one switch with
+    /// the same effect.
+    fn switches(&self, signs: Floats<'_>) -> PyResult<(Vec<usize>, Vec<f64>)> {
+        let found = core::switches(&self.time, &in_order(&signs)?, &self.crossings);
+        Ok(found.iter().map(|own| (own.count, own.time)).unzip())
+    }
+
+    /// Number of cycles, their mean delay by the switches, and its standard error.
+    fn delays(&self, switches: Floats<'_>) -> PyResult<(usize, f64, f64)> {
+        let found = core::cycles(&self.crossings, &in_order(&switches)?);
+        Ok((found.count, found.delay, found.error))
+    }
+
+    /// First and last row of the cycle where its switches arrive after a delay, the path of unit speed there
+    /// and the output, both about their means, and the speed along the path.
+    #[expect(clippy::type_complexity, reason = "a tuple for Python")]
+    fn path<'py>(
+        &self,
+        py: Python<'py>,
+        switches: Floats<'_>,
+        delay: f64,
+        lag: f64,
+    ) -> PyResult<Option<([usize; 2], Vector<'py>, Vector<'py>, f64)>> {
+        let rows = (&*self.time, &*self.output, &*self.reference);
+        let found = core::cycle_path(rows, &in_order(&switches)?, delay, lag);
+        Ok(found.map(|own| {
+            let ends = [own.rows.start, own.rows.end - 1];
+            let (path, output) = (own.path.into_pyarray(py), own.output.into_pyarray(py));
+            (ends, path, output, own.speed)
+        }))
+    }
+
+    /// Increase of a quarter of a period, half of which is `half`, by a lag.
+    #[staticmethod]
+    fn delay_by_lag(lag: f64, half: f64) -> f64 {
+        core::delay_by_lag(lag, half)
+    }
 }
 
 /// F, dF/dt and dF/dlag of a plant under commands at some times.
@@ -312,14 +332,4 @@ pub(crate) fn correlation_peak(
     };
     let (command, response) = (in_order(&command)?, in_order(&response)?);
     Ok(core::peak(&command, &response, weighting, shifts))
-}
-
-/// Number of cycles between crossings, their mean delay by the switches, and its standard error.
-#[pyfunction]
-pub(crate) fn cycle_delays(
-    crossings: Floats<'_>,
-    switches: Floats<'_>,
-) -> PyResult<(usize, f64, f64)> {
-    let found = core::cycles(&in_order(&crossings)?, &in_order(&switches)?);
-    Ok((found.count, found.delay, found.error))
 }

@@ -6,14 +6,12 @@ use pyo3::types::PyDict;
 
 use crate::arrays::converted;
 use crate::estimation::GivenDisturbance;
+use crate::flight_plant::FlightPlant;
 
 /// What is known before the first row.
 #[derive(FromPyObject)]
 struct GivenSettings {
-    num: Vec<f64>,
-    den: Vec<f64>,
-    air_behind_lags: bool,
-    own_lag: f64,
+    plant: FlightPlant,
     delays: Vec<f64>,
     follow: bool,
     layers: Vec<(Vec<f64>, f64, Vec<f64>)>,
@@ -34,11 +32,12 @@ struct GivenSettings {
 
 impl GivenSettings {
     fn settings(self) -> PyResult<Settings> {
-        let plant = converted(Plant::new(&self.num, &self.den))?;
+        let given = &self.plant;
+        let plant = converted(Plant::new(&given.num, &given.den))?;
         let layers = self.layers.into_iter();
         Ok(Settings {
-            plant: plant.with_air_behind_lags(self.air_behind_lags),
-            own_lag: self.own_lag,
+            plant: plant.with_air_behind_lags(given.air_behind_lags),
+            own_lag: given.own_lag,
             delays: self.delays,
             follow: self.follow,
             layers: layers

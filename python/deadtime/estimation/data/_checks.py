@@ -141,13 +141,6 @@ def check_response(output: Array, misfit: Array, numbers: int, autocorrelation: 
         )
 
 
-def embedded(cov: Array, loose: list[int], size: int) -> Array:
-    """Covariance of all parameters; zero for those at a bound, which were not `loose`."""
-    full = np.zeros((size, size))
-    full[np.ix_(loose, loose)] = cov
-    return full
-
-
 def standard_errors(
     names: tuple[str, ...], cov: Array, plant: Plant | None = None
 ) -> dict[str, float]:

@@ -1,6 +1,7 @@
 """Commands of a recording, and simulations of the recorded loop over a window of it.
 
-The command of every row is the logged one, or computed from the controller.
+The command of every row is the logged one, or computed from the controller. One that was logged one
+row late or early is put on its row.
 
 `SimulatedRecording` alone turns a window of a recording into initial conditions: the loop starts
 at rest at its output at the beginning of the window, the simulation is evaluated at the time stamps
@@ -18,10 +19,11 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError, RecordingError
+from deadtime._base.validation import OpenRange
 from deadtime.estimation._native import LoopMisfit
 from deadtime.estimation.data._checks import start_and_span
 from deadtime.loops import ControlLoop, P
-from deadtime.recordings import Recording
+from deadtime.recordings import Columns, Recording, RecordingCheck
 
 #: A logged command is taken to be the P controller's where the two differ by less than this share
 #: of the command's standard deviation. Larger values accept more noise in the log, and more foreign
@@ -51,13 +53,18 @@ def known_commands(recording: Recording, loop: ControlLoop) -> tuple[Array, str]
     """
     if recording.command is not None:
         return limited(recording.command, loop), "logged"
-    if not isinstance(loop.controller, P):
+    command = commands_by_law(recording, loop)
+    if command is None:
         raise NotIdentifiableError(
             "the recording has no command, and a command can be computed from reference and "
             "output only for a P controller. Log the command, or use method='waveform'"
         )
-    command = loop.controller.Kp * (recording.reference - recording.output)
-    return limited(command, loop), "computed from reference and output"
+    return command, "computed from reference and output"
+
+
+def commands_by_law(recording: Recording, loop: ControlLoop) -> Array | None:
+    """Commands of a P controller, within its limit; None of other controllers."""
+    return Columns(recording.time, recording.reference, recording.output, None).commands(loop)
 
 
 def limited(command: Array, loop: ControlLoop) -> Array:
@@ -73,10 +80,9 @@ def moves_between_rows(recording: Recording, loop: ControlLoop) -> bool:
     """
     if loop.is_sampled or recording.command is None or recording.sent is not None:
         return False
-    if not isinstance(loop.controller, P):
+    computed, logged = commands_by_law(recording, loop), limited(recording.command, loop)
+    if computed is None:
         return False
-    computed, _ = known_commands(replace(recording, command=None), loop)
-    logged, _ = known_commands(recording, loop)
     return float(np.std(computed - logged)) < ALIKE * float(np.std(logged))
 
 
@@ -137,10 +143,7 @@ class SimulatedRecording:
     """
 
     def __init__(
-        self,
-        recording: Recording,
-        loop: ControlLoop,
-        window: tuple[float | None, float | None] = (None, None),
+        self, recording: Recording, loop: ControlLoop, window: OpenRange = (None, None)
     ) -> None:
         rows = recording.rows(*window)
         # The recorded output is the one that the controller received, wherever the delay is.
@@ -204,12 +207,11 @@ def _check_work(window: Recording, loop: ControlLoop) -> None:
             f"{len(window)} samples are more than the {MOST_SAMPLES} that a fit "
             f"can simulate in reasonable time: {advice}, or keep every tenth sample"
         )
-    held = 0.0
-    if loop.sample_time is not None:
-        held = float(window.time[-1] - window.time[0]) / loop.sample_time
+    span = float(window.time[-1] - window.time[0])
+    held = span / (loop.sample_time or math.inf)
     if held > MOST_SAMPLES:
         raise RecordingError(
-            f"the recording lasts {window.time[-1] - window.time[0]:g} s, which "
+            f"the recording lasts {span:g} s, which "
             f"is {held:.3g} times the sample_time of {loop.sample_time:g} s: "
             f"{advice}, and check that the time stamps are seconds"
         )
@@ -219,8 +221,33 @@ def _past_commands(recording: Recording, loop: ControlLoop, start: int) -> Array
     """Commands before row `start`, where the loop is sampled and the rows determine them."""
     if loop.sample_time is None or start == 0:
         return np.empty(0)
-    if recording.command is not None:
-        return recording.command[:start]
-    if not isinstance(loop.controller, P):
-        return np.empty(0)
-    return known_commands(recording, loop)[0][:start]
+    command = recording.command
+    if command is None:
+        command = commands_by_law(recording, loop)
+    return np.empty(0) if command is None else command[:start]
+
+
+#: Rows further apart than so many times the usual are not neighbours.
+NEIGHBOURS = 1.5
+
+#: By how many rows a command is taken later, by what a check finds.
+WAYS = {"command_late": 1, "command_early": -1}
+
+
+def rows_off(check: RecordingCheck) -> int:
+    """By how many rows a command was logged late, as the law of its controller shows."""
+    return next((WAYS[finding.code] for finding in check.findings if finding.code in WAYS), 0)
+
+
+def on_its_row(recording: Recording, loop: ControlLoop, check: RecordingCheck) -> Recording:
+    """The recording with each command on its row; by the law where there is none."""
+    rows = rows_off(check)
+    assert recording.command is not None
+    time, command = recording.time, recording.command
+    largest = loop.limit or check.limit_seen or float(np.max(np.abs(command)))
+    law = commands_by_law(recording, loop.replace(limit=largest))
+    assert law is not None
+    wanted = np.arange(time.size) + rows
+    places = np.clip(wanted, 0, time.size - 1)
+    known = (places == wanted) & (np.abs(time[places] - time) < NEIGHBOURS * check.row_time)
+    return replace(recording, command=np.where(known, command[places], law))

@@ -19,7 +19,7 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import extremes_decay, step_extremes
 from deadtime.estimation.data._checks import excited
 from deadtime.loops import ControlLoop, Integrator, P
-from deadtime.recordings import Recording, Step
+from deadtime.recordings import Recording, Step, noise_of_second_differences
 
 #: Smallest size of what is read from the response, in standard deviations of the noise.
 CLEARANCE = 3.0
@@ -117,17 +117,18 @@ def read_step(recording: Recording) -> StepReading:
             f"before the step from {step.before:g} to {step.after:g} the output is "
             f"{start:g}, so the loop was not at rest: choose a window that begins at rest"
         )
-    travelled = (after - start) / size
     since = recording.time[step.index :] - step.time
-    tail = travelled[-max(4, travelled.size // 4) :]
-    if float(np.mean(tail)) < FOLLOWS:
+    noise = _noise(before, after[-max(4, after.size // 4) :]) / abs(size)
+    travelled = (after - start) / size
+    reading = StepReading(step, start, before.size, size, noise, since, travelled)
+    ended = float(np.mean(reading.tail))
+    if ended < FOLLOWS:
         raise NotIdentifiableError(
-            f"the output ends at {100 * float(np.mean(tail)):.3g} % of the "
+            f"the output ends at {100 * ended:.3g} % of the "
             f"step at {step.time:g} s, so it does not follow the "
             "reference: check columns and units, or choose a longer window"
         )
-    noise = _noise(before, after[-max(4, after.size // 4) :]) / abs(size)
-    return StepReading(step, start, before.size, size, noise, since, travelled)
+    return reading
 
 
 def _noise(before: Array, tail: Array) -> float:
@@ -137,11 +138,6 @@ def _noise(before: Array, tail: Array) -> float:
         return resting
     # Few samples often give too small a value.
     return max(resting, noise_of_second_differences(tail))
-
-
-def noise_of_second_differences(values: Array) -> float:
-    """Standard deviation of the noise on a smooth signal of at least three values."""
-    return float(np.median(np.abs(np.diff(values, 2)))) / 0.6745 / math.sqrt(6.0)
 
 
 class Extreme(NamedTuple):

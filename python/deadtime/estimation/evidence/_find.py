@@ -11,14 +11,13 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 
 import deadtime.estimation._native as native
+import deadtime.estimation.evidence._estimate as evidence
 from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import Verdict
-from deadtime.estimation.evidence._candidate import CLEAR, candidate_of
-from deadtime.estimation.evidence._causes import causes_of, sensor_faults_of
-from deadtime.estimation.evidence._estimate import PlantEstimate
+from deadtime.estimation.evidence._estimate import TAKEN_AT_REST, PlantEstimate
+from deadtime.estimation.evidence._found import CLEAR, candidate_of, causes_of, sensor_faults_of
 from deadtime.estimation.evidence._numbers import FittedRecording
 from deadtime.estimation.evidence._question import Question, questions_of
-from deadtime.estimation.evidence._words import TAKEN_AT_REST, TOO_EARLY, moves_in, reason_of
 from deadtime.recordings import Recording
 
 #: Lower and upper end of an interval.
@@ -36,10 +35,10 @@ def estimate_by_evidence(
     found = question.answer(progress=progress)
     first = estimate_of(question, found)
     moves_at_all = any(np.ptp(part.command) > 0.0 for part in question.each)
-    if first.at_rest or moves_in(first) or not moves_at_all:
+    if first.at_rest or evidence.moves_in(first) or not moves_at_all:
         return _beside_all(first, found)
     if question.at_rest is False:
-        return replace(first, verdict="none", reason=TOO_EARLY)
+        return replace(first, verdict="none", reason=evidence.TOO_EARLY)
     question = replace(question, at_rest=True)
     found = question.answer()
     return _taken_at_rest(_beside_all(estimate_of(question, found), found))
@@ -50,12 +49,12 @@ def _beside_all(fit: PlantEstimate, found: native.FamilyFit) -> PlantEstimate:
     question = fit._question
     if question.plant is None:
         return fit
-    whole = question.of(None).answer()
+    whole = replace(question, plant=None).answer()
     best, least = whole.candidates[0], found.candidates[0].bic
     if not least - best.bic > CLEAR:
         return fit
     better = candidate_of(best, least)
-    named = replace(fit, _better=better)
+    named = replace(fit, better=better)
     # A cause may imitate the lag that the plant lacks.
     is_open = bool(fit.causes) or is_outside(whole, partial(_ends, found))
     if named.verdict != "reliable" or not is_open:
@@ -119,19 +118,18 @@ def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
     """The answer of the kernel as a result."""
     answering = [fit for fit in found.candidates if fit.values[fit.names.index("gain")] != 0.0]
     candidates = tuple(candidate_of(fit, answering[0].bic) for fit in answering)
-    first, best = (answering[0], candidates[0]) if answering else (None, None)
+    first = answering[0] if answering else None
     runs = [_run(part, first, place) for place, part in enumerate(question.each)]
-    numbers: dict[str, Any] = {
-        "delay": math.nan if best is None else best.delay,
-        "plant": None if best is None else best.plant,
-        "parameters": {} if best is None else dict(best.parameters),
-    }
+    numbers: dict[str, Any] = {"delay": math.nan, "plant": None, "parameters": {}}
+    if candidates:
+        numbers = {name: getattr(candidates[0], name) for name in numbers}
     steps = [native.coarse_step(run.recording.output, run.noise_std) for run in runs]
     step = next(filter(None, steps), 0.0)
+    is_one_step = not question.others and np.count_nonzero(np.diff(question.command)) == 1
     verdict = "indication" if step and found.verdict == "reliable" else found.verdict
     return PlantEstimate(
         verdict=cast(Verdict, verdict),
-        reason=reason_of(found.reason, found, _is_one_step(question), step),
+        reason=evidence.reason_of(found.reason, found, is_one_step, step),
         **numbers,
         **found.shown,
         candidates=candidates,
@@ -147,11 +145,6 @@ def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
         _question=question,
         _native=[found],
     )
-
-
-def _is_one_step(question: Question) -> bool:
-    """Whether the command changes once, in one recording."""
-    return not question.others and np.count_nonzero(np.diff(question.command)) == 1
 
 
 def _run(question: Question, first: native.FamilyCandidate | None, place: int) -> FittedRecording:

@@ -15,8 +15,7 @@ from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import confidence, one_dimensional
 from deadtime._base.verdicts import Verdict
-from deadtime.estimation.evidence._candidate import CLEAR, PlantCandidate, plant_of
-from deadtime.estimation.evidence._causes import Cause, SensorFault
+from deadtime.estimation.evidence._found import CLEAR, Cause, PlantCandidate, SensorFault, plant_of
 from deadtime.estimation.evidence._question import Question
 from deadtime.loops import Controller, ControlLoop, Plant
 from deadtime.recordings import Recording
@@ -128,10 +127,10 @@ class FoundPlant(AtCrossover, ReadOnlyArrays):
     others: tuple[FittedRecording, ...] = ()
     causes: tuple[Cause, ...] = ()
     sensor_faults: tuple[SensorFault, ...] = ()
+    better: PlantCandidate | None = None
     _own_noise: float = math.nan
     _code: str = ""
     _question: Question = field(kw_only=True)
-    _better: PlantCandidate | None = None
     _at_crossover: tuple[float, float, float] = (math.nan, math.nan, math.nan)
     _native: list[native.FamilyFit] = field(default_factory=list)
 
@@ -141,11 +140,6 @@ class FoundPlant(AtCrossover, ReadOnlyArrays):
         if not self.candidates:
             raise ValueError(f"no plant: {self.reason}")
         return self.candidates[0]
-
-    @property
-    def better(self) -> PlantCandidate | None:
-        """A plant that explains the recording clearly better than the one that was named."""
-        return self._better
 
     @property
     def runs(self) -> tuple[FittedRecording, ...]:
@@ -348,8 +342,8 @@ class FoundPlant(AtCrossover, ReadOnlyArrays):
         for fit in near or found[:1]:
 
             def number(values: Array, fit: native.FamilyCandidate = fit) -> float:
-                delay, plant = plant_of(fit, values.tolist())
-                return float(of(around.replace(plant=plant, delay=delay)))
+                plant, numbers = plant_of(fit, values.tolist())
+                return float(of(around.replace(plant=plant, delay=max(numbers["delay"], 0.0))))
 
             steps = np.diag(STEP * np.array(fit.errors))
             values, n = np.array(fit.values), len(fit.names)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal, TypeAlias
@@ -14,11 +14,32 @@ import deadtime.estimation._native as native
 from deadtime._base.arrays import Array
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.validation import OpenRange, open_interval, positive
-from deadtime.estimation.data._given import given_recordings, one_each
-from deadtime.estimation.data._on_its_row import on_its_row, rows_off
+from deadtime._base.validation import OpenRange, is_range, open_interval, positive
+from deadtime.estimation.data._simulated import commands_by_law, on_its_row, rows_off
 from deadtime.loops import Controller, ControlLoop, Integrator, P
-from deadtime.recordings import Columns, Recording
+from deadtime.recordings import Recording
+
+
+def given_recordings(recording: Any) -> list[Any]:
+    """The recordings, of which one may be given alone."""
+    is_several = isinstance(recording, (list, tuple, Iterator))
+    recordings = list(recording) if is_several else [recording]
+    if not recordings:
+        raise ValueError("no recording was given: give a recording, or a list of recordings")
+    return recordings
+
+
+def one_each(name: str, given: Any, number: int) -> list[Any]:
+    """What was given for all recordings, or one each, as a list."""
+    is_window = name == "window" and is_range(given) and len(given) == 2
+    is_several = isinstance(given, (list, tuple)) and not is_window
+    found = list(given) if is_several else [given] * number
+    if len(found) != number:
+        raise ValueError(
+            f"{number} recordings and {len(found)} of `{name}`: give one for all, or one each"
+        )
+    return found
+
 
 #: How the command moves between two rows.
 Between: TypeAlias = Literal["held", "straight", "samples", "undecided"]
@@ -35,6 +56,10 @@ PLANTS = (
     "integrator, two lags",
     "integrator, two lags, zero",
 )
+
+
+#: What the kernel is told of all records together, by its names.
+ASKED = ("between", "closed_loop", "at_rest", "largest_delay", "plant", "integrates", "causes")
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,23 +133,8 @@ class Question(ReadOnlyArrays):
         that alone.
         """
         records = [part.record for part in self.each]
-        return native.fit_family(
-            records,
-            kind=self.between,
-            controller=self.closed_loop,
-            at_rest=self.at_rest,
-            largest_delay=self.largest_delay,
-            plant=self.plant,
-            integrating=self.integrates,
-            noise=noise,
-            causes=self.causes,
-            progress=progress,
-            known=known,
-        )
-
-    def of(self, plant: str | None) -> Question:
-        """The same for another kind of plant."""
-        return replace(self, plant=plant)
+        asked: dict[str, Any] = {name: getattr(self, name) for name in ASKED}
+        return native.fit_family(records, **asked, noise=noise, progress=progress, known=known)
 
     def options(self) -> dict[str, Any]:
         """What was given besides the recording, as arguments of `estimate_delay`."""
@@ -134,10 +144,8 @@ class Question(ReadOnlyArrays):
             found[name] = own[0] if own.count(own[0]) == len(own) else own
         for name in ("limit", "at_rest", "largest_delay", "integrates", "plant"):
             found[name] = getattr(self, name)
-        if self.hold:
-            found["hold"] = self.hold
-        if self.between != "undecided":
-            found["between"] = self.between
+        found["hold"] = self.hold or None
+        found["between"] = None if self.between == "undecided" else self.between
         if self.controller is None and self.closed_loop != shows_controller(self.recording):
             found["closed_loop"] = self.closed_loop
         return {name: value for name, value in found.items() if value is not None}
@@ -231,8 +239,7 @@ def _with_command(
             "and output only for a P controller. Name the column of the command"
         )
     if recording.command is None:
-        columns = Columns(recording.time, recording.reference, recording.output, None)
-        return replace(recording, command=columns.commands(loop)), 0
+        return replace(recording, command=commands_by_law(recording, loop)), 0
     check = recording.check(loop) if has_law else None
     if check is None or not (rows := rows_off(check)):
         return recording, 0

@@ -26,8 +26,9 @@ from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import rough
 from deadtime.estimation._result import DelayEstimate, bic
 from deadtime.estimation.data._simulated import moves_between_rows
-from deadtime.estimation.evidence._candidate import CLEAR, PlantCandidate, candidate_of
+from deadtime.estimation.evidence._estimate import call_with
 from deadtime.estimation.evidence._find import is_outside
+from deadtime.estimation.evidence._found import CLEAR, PlantCandidate, candidate_of
 from deadtime.estimation.evidence._question import PLANTS, Question, question_of
 from deadtime.estimation.methods._method import Method, Run
 from deadtime.estimation.methods._output_error import OutputError
@@ -60,7 +61,7 @@ def beside_rivals(fit: DelayEstimate, run: Run, method: Method) -> DelayEstimate
     best = found.candidates[0]
     rival = candidate_of(best, best.bic)
     lead = min(lead, _lead_in_air(fit, rival, run, method))
-    if lead > CLEAR and (named := _answer(asked.of(kind))) is not None:
+    if lead > CLEAR and (named := _answer(replace(asked, plant=kind))) is not None:
         lead = min(lead, _bic_of(named, kind) - best.bic)
     if not lead > CLEAR:
         return fit
@@ -73,7 +74,8 @@ def beside_rivals(fit: DelayEstimate, run: Run, method: Method) -> DelayEstimate
     if best.plant == kind_of(plant, list(plant.parameters)):
         free = ("delay", *(name for name in plant.parameters if name in ("lag", *best.names)))
         return fit.doubted(why, f"free={free!r}")
-    return fit.doubted(why, f"the call without the plant, {_call(question)}")
+    given = {name: value for name, value in question.options().items() if value != (None, None)}
+    return fit.doubted(why, f"the call without the plant, {call_with(given)}")
 
 
 def kind_of(plant: Plant, free: Sequence[str]) -> str | None:
@@ -189,13 +191,3 @@ def _lead_in_air(fit: DelayEstimate, rival: PlantCandidate, run: Run, method: Me
     except (DeadtimeError, ValueError):
         return -math.inf
     return bic(fit) - bic(other) - len(held) * math.log(other.residuals.size)
-
-
-def _call(question: Question) -> str:
-    """The call that estimates without a plant."""
-    given = "".join(
-        f", {name}={f'dtm.{value!r}' if isinstance(value, P) else value}"
-        for name, value in question.options().items()
-        if value != (None, None)
-    )
-    return f"dtm.estimate_delay(recording{given})"

@@ -5,28 +5,31 @@
 F the exact response of 1/(s (lag s + 1)), or of another plant, to the command as it was held, a the
 gain, b the output at the start. For a given delay and lag the best a and b are
 linear least squares (variable projection, Golub & Pereyra 1973).
+
+Rows before a known digital filter are averaged over the time by which the filter is late, in which
+filtered rows are alike, and at least in pairs. The filter and its inverse are those of the kernel.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 import deadtime.estimation._native as native
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._least_squares import Ends, ModelOfOne
+from deadtime.estimation._plant import behind_limits, plant_model
 from deadtime.estimation.data._checks import check_moves
-from deadtime.estimation.data._known_filter import before_filter
 from deadtime.estimation.data._simulated import commands_of, limited
-from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, place_of
-from deadtime.estimation.likelihood._plant import behind_limits, plant_model
 from deadtime.estimation.methods._method import Run
 from deadtime.loops import FirstOrder, Integrator, P, Plant, RateLimited
+from deadtime.recordings import Recording
 
 #: Names of the limits of the rate of a command.
 RATE_LIMITS = ("rate", "rate_of_rate")
@@ -82,54 +85,41 @@ class CommandedModel(ModelOfOne):
         values |= dict(zip(fit.plant.lag_names, numbers.lags, strict=True))
         known = {**self.known, **{name: values[name] for name in self.known if name in values}}
         point = np.array([*(values[name] for name in self.names), 0.0])
-        moved = replace(self, known=known)
-        if self.offset is not None:
-            return replace(moved, start=point[:-1])
-        point[-1] = -float(np.mean(moved.misfit(point)))
-        return replace(moved, start=point)
+        moved = replace(self, known=known, start=point[: len(self.labels)])
+        if self.offset is None:
+            point[-1] = -float(np.mean(moved.misfit(point)))
+        return moved
 
     @property
     def kernel(self) -> native.CommandedMisfit:
         """The misfit of the kernel."""
         plant, data, commands = behind_limits(self.plant), self.recording, self.commands
-        is_lag = isinstance(plant, FirstOrder)
-        slow = "time_constant" if is_lag else "lag" if isinstance(plant, Integrator) else ""
+        slow = {Integrator: "lag", FirstOrder: "time_constant"}.get(type(plant), "")
         numbers = {**plant.parameters, **self.known, "gain": 1.0}
-        names = ("delay", "gain", slow, *RATE_LIMITS)
         return native.CommandedMisfit(
             data.time,
             data.output,
             (commands.time, commands.command),
             plant=None if slow else plant._polynomials(numbers),
-            is_lag=is_lag,
+            slow=slow,
             is_limited=isinstance(self.plant, RateLimited),
-            known=[self.known.get(name, math.inf) for name in names],
-            places=[place_of(name, self.names) for name in names],
+            names=self.names,
+            known=self.known,
             start=self.offset,
         )
-
-    @property
-    def axes(self) -> list[list[float]]:
-        """The point that the search starts from."""
-        return [[value] for value in self.start.tolist()]
 
     @cached_property
     def span(self) -> float:
         return float(self.recording.time[-1] - self.recording.time[0])
 
     def ends(self, label: str) -> Ends:
-        value = self.known.get(label, 1.0)
-        if label.startswith("lag_") and value >= 0.0:
-            # A shorter one acts as a delay, and takes ever longer to simulate.
-            return Ends(native.SHORTEST_LAG * self.recording.sample_time, self.span)
-        positive = Ends(1e-3 * abs(value), 1e3 * abs(value))
-        return {
+        size = abs(self.known.get(label, 1.0))
+        found = {
             "delay": Ends(0.0, native.LONGEST_DELAY * self.span),
             "lag": Ends(0.0, self.span),
-            "time_constant": positive,
-            "rate": positive,
-            "rate_of_rate": positive,
+            **dict.fromkeys(("time_constant", *RATE_LIMITS), Ends(1e-3 * size, 1e3 * size)),
         }.get(label, Ends(-np.inf, np.inf))
+        return found._replace(starts=[float(self.start[self.labels.index(label)])])
 
 
 def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> CommandedModel:
@@ -194,3 +184,84 @@ def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> Comma
 def _fewest(names: tuple[str, ...]) -> int:
     """Rows below which these numbers are not fitted."""
     return 2 * (len(names) + 2)
+
+
+#: Coefficients (b, a) in powers of 1/z.
+GivenFilter: TypeAlias = tuple[Sequence[float], Sequence[float]]
+
+#: Largest difference between two steps of time, as a share of the mean step.
+EVEN = 0.5
+
+
+def known_filter(given: GivenFilter | None) -> native.KnownFilter | None:
+    """The filter (b, a), as scipy.signal designs and takes it, with its inverse.
+
+    Raises
+    ------
+    TypeError
+        If it is not a pair of sequences of numbers.
+    ValueError
+        If it is not finite or not stable, or cannot be undone.
+    """
+    if given is None:
+        return None
+    try:
+        b, a = (np.atleast_1d(np.asarray(part, dtype=np.float64)) for part in given)
+    except (TypeError, ValueError):
+        raise TypeError(
+            f"output_filter={given!r}: give (b, a), two lists of coefficients in powers of 1/z"
+        ) from None
+    for name, part in (("b", b), ("a", a)):
+        if part.ndim != 1 or not np.all(np.isfinite(part)) or not np.any(part):
+            raise ValueError(f"{name}={part.tolist()}: give finite coefficients, not all zero")
+    found, is_stable = native.KnownFilter.inverted(b.tolist(), a.tolist())
+    if not is_stable:
+        raise ValueError(
+            f"a={a.tolist()}: the filter with these "
+            "coefficients is not stable. Check the coefficients"
+        )
+    if found is None:
+        raise ValueError(
+            f"b={b.tolist()}: the filter cannot be undone. It removes a frequency that "
+            "the response needs, or has a zero outside the unit circle. Leave the filter "
+            "out"
+        )
+    return found
+
+
+def before_filter(recording: Recording, rows: slice, known: native.KnownFilter) -> Recording:
+    """What the sensor read in these rows, averaged, at the times it read it.
+
+    Raises
+    ------
+    NotIdentifiableError
+        If the rows are not the samples of the filter, one after the other.
+    """
+    steps = np.diff(recording.time)
+    between = float(np.mean(steps))
+    if np.max(np.abs(steps - between)) > EVEN * between:
+        raise NotIdentifiableError(
+            f"rows are {steps.min():g} to {steps.max():g} s apart, but a filter can be "
+            "undone only in evenly spaced rows: choose a window without missing rows"
+        )
+    together = known.together
+    first = max(rows.start, known.start)
+    count = max(0, rows.stop - first) // together
+    if count < together:
+        raise NotIdentifiableError(
+            f"{len(recording)} rows are too few to undo the filter: give a longer recording"
+        )
+    kept = slice(first, first + count * together)
+
+    def mean(values: Array) -> Array:
+        return np.asarray(values[kept].reshape(count, together).mean(axis=1))
+
+    command = None if recording.command is None else mean(recording.command)
+    return Recording(
+        mean(recording.time) - known.remaining * between,
+        mean(recording.reference),
+        mean(known.undone(recording.output)),
+        command,
+        dict(recording.units),
+        recording.source,
+    )

@@ -1,27 +1,122 @@
-"""Turn the likeliest plant and noise of recordings into an estimate, also from rounded rows."""
+"""Turn the likeliest plant and noise of recordings into an estimate, also from rounded rows.
+
+What the tests of a fit say is put into words.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 
 import deadtime.estimation._native as native
+from deadtime._base.digits import stated
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.verdicts import verdict_if
-from deadtime.estimation._result import REASONS, CramerRaoBound, DelayEstimate, FittedRun
+from deadtime.estimation._least_squares import JointModel, Model, Profile, Whiteness, places_of
+from deadtime.estimation._result import REASONS, CramerRaoBound, DelayEstimate, FittedRun, of_runs
 from deadtime.estimation.data._checks import LEAST_GAIN, standard_errors
-from deadtime.estimation.fit._least_squares import JointModel, Model
-from deadtime.estimation.fit._profile import Profile, places_of
-from deadtime.estimation.likelihood._judgement import Adequacy, unseen_in_words
 from deadtime.estimation.methods._commanded_model import CommandedModel
-from deadtime.estimation.methods._conclusion import COLOURED, advice
-from deadtime.estimation.methods._method import Run
+from deadtime.estimation.methods._method import COLOURED, Run, advice
 from deadtime.experiments import FlightNoise
+
+#: What speaks against a fit, by the kernel's name of it, with its sizes.
+WORDS = {
+    "colour": (
+        "the residuals are not white even after the "
+        "noise was fitted (lag-1 autocorrelation {0:.2f})"
+    ),
+    "lag": "with a further lag of {0:.3g} s the recording is more likely, so the plant lacks a lag",
+    "lag moves": (
+        "with a further lag of {0:.3g} s, the sum of delay and "
+        "lag would be {1:.3g} s, which is outside its interval"
+    ),
+    "overshoot": (
+        "with a further lag of {0:.3g} s and a zero of {1:.3g} "
+        "s the recording is more likely, so the plant lacks both"
+    ),
+    "below zero": (
+        "the likelihood still rises as the delay falls to "
+        "zero, so the plant has too much lag, or lacks a zero"
+    ),
+    "change": (
+        "the delay is not constant over the window{where}: its standard deviation is {time}"
+    ),
+    "speed": (
+        "the noise grows with the speed of the output{where}, so "
+        "the time stamps are probably not the times of the samples"
+    ),
+    "restless air": (
+        "the fitted disturbance{where} is too large to be wind. Within a row it changes "
+        "by {0:.2g} times the sensor noise, so the plant probably lacks a lag or a zero"
+    ),
+    "moving air": (
+        "the fitted disturbance{where} is larger while the vehicle "
+        "moves than at rest, so the plant probably lacks a lag or a zero"
+    ),
+    "gains": "the recordings contradict one another in {name}: {values}",
+    "totals": "the recordings contradict one another in {name}: {times}",
+}
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """What the tests say.
+
+    Attributes
+    ----------
+    whiteness : Whiteness
+        Of the whitened residuals.
+    reasons : tuple of str
+        Why the model does not hold; empty where it is.
+    plant_lacks : bool
+        Whether one of them is that the plant lacks something: a lag, or what the air stands for.
+    coloured : bool
+        Whether the whitened residuals have a colour that is there while the vehicle rests, too:
+        then the intervals have to be made valid for it.
+    """
+
+    whiteness: Whiteness
+    reasons: tuple[str, ...]
+    plant_lacks: bool = False
+    coloured: bool = False
+
+
+def adequacy_of(profile: native.FlightProfile) -> Adequacy:
+    """Test a fit."""
+    found = profile.judge()
+    against = [finding for finding in found.findings if finding.is_against]
+    return Adequacy(
+        Whiteness(*found.whiteness),
+        tuple(_in_words(finding, profile) for finding in against),
+        any(finding.plant_lacks for finding in against),
+        found.is_coloured,
+    )
+
+
+def unseen_in_words(lag: float) -> str:
+    """The further lag that would not be seen, up to the verb."""
+    if math.isinf(lag):
+        return "no further lag would"
+    return f"a further lag below {lag:.2g} s would not"
+
+
+def _in_words(found: native.FlightFinding, profile: native.FlightProfile) -> str:
+    several = found.run is not None and len(profile.fit.numbers.noise) > 1
+    pairs = list(zip(found.sizes[::2], found.sizes[1::2], strict=False))
+    total = next((name for name in dict(profile.stderr) if name.startswith("delay+")), "")
+    return WORDS[found.cause].format(
+        *found.sizes,
+        where=f" in recording {found.run + 1}" if several and found.run is not None else "",
+        time=stated(found.sizes[0], math.nan, "s") if found.cause == "change" else "",
+        name="gain" if found.cause == "gains" else total,
+        values=", ".join(stated(value, error, "") for value, error in pairs),
+        times=", ".join(stated(value, error, "s") for value, error in pairs),
+    )
 
 
 def profile_for(
@@ -80,23 +175,18 @@ def concluded_flight(
     ending = f"; {unseen_in_words(unseen)} have been seen"
     if adequacy.reasons:
         ending = f"{REASONS}{'; '.join(adequacy.reasons)}{advice(names, runs[0].loop)}"
-    labels = (*names, *(["initial output"] if fit.runs[0].offset else []))
-    labels += ("trim",) * fit.trim
+    labels = (*names, *["initial output"] * fit.runs[0].offset, *["trim"] * fit.trim)
     return DelayEstimate(
+        **of_runs(fitted),
         method=method,
-        loop=fitted[0].loop,
         free=names,
         stderr=stderr,
         cov=profile.cov,
         crb=CramerRaoBound(labels, noise[0], least),
-        recording=fitted[0].recording,
-        residuals=fitted[0].residuals,
         whiteness=adequacy.whiteness,
         verdict=verdict_if(not adequacy.reasons),
         message="; ".join([message, str(noise[0]), *_remarks(left_out, scatter, held)]) + ending,
         details={**details, "rows_left_out": left_out, "unseen_lag": unseen, **scatter},
-        others=fitted[1:],
-        noise=noise[0],
         _profile=profile,
     )
 
@@ -131,11 +221,9 @@ def _remarks(left_out: int, scatter: Mapping[str, float], held: list[str]) -> li
         f"a standard deviation of {size:.2g} s"
         for what, size in scatter.items()
     ]
-    return (
-        [*said, f"the {' and '.join(held)} was estimated as zero, which is its bound"]
-        if held
-        else said
-    )
+    if held:
+        said.append(f"the {' and '.join(held)} was estimated as zero, which is its bound")
+    return said
 
 
 def read_as_intervals(estimate: DelayEstimate, models: Sequence[CommandedModel]) -> DelayEstimate:
@@ -174,15 +262,12 @@ def read_as_intervals(estimate: DelayEstimate, models: Sequence[CommandedModel])
     message = estimate.message.replace(str(estimate.noise), f"{noise[0]} before the rounding")
     return replace(
         estimate,
-        loop=runs[0].loop,
+        **of_runs(runs),
         stderr={name: error * unseen[name] for name, error in plain.items()},
         cov=peak.cov[:count, :count],
         crb=CramerRaoBound(model.labels, noise[0], plain),
-        residuals=runs[0].residuals,
-        noise=noise[0],
         message=f"{message}; each row is an interval as wide as its rounding",
         details={**estimate.details, "initial_output": parts[0].start_of(peak.point)},
-        others=runs[1:],
         _profile=Profile(
             partial(_rounded_cost, model, readings, peak, runs[0].loop.parameters, freedom),
             best=float(freedom),

@@ -3,6 +3,9 @@
 Because the command is known, a limit and noise that the controller acts on have no effect, and
 least squares is maximum likelihood for white noise: the standard error is the Cramér-Rao bound. The
 model is in `_commanded_model`. The stages of one estimate are read one after the other: one file.
+
+A log is often stamped where it is written, some time after the sample was taken. The rows then are
+regular and their stamps are not. Where each stamp is near a regular time, either may be true.
 """
 
 from __future__ import annotations
@@ -14,23 +17,16 @@ from functools import cached_property, partial
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import deadtime.estimation._native as native
+import deadtime.estimation.methods._commanded_model as commanded
 import deadtime.estimation.methods._flight_conclusion as flight
+import deadtime.estimation.methods._method as base
 from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._least_squares import Minimum, Model, solve_jointly
+from deadtime.estimation._plant import names_in_kernel, plant_model
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
-from deadtime.estimation.data._known_filter import GivenFilter, known_filter
-from deadtime.estimation.data._stamps import on_regular_times
-from deadtime.estimation.fit._least_squares import Minimum, Model, solve_jointly
-from deadtime.estimation.likelihood._judgement import Adequacy, adequacy_of
-from deadtime.estimation.likelihood._plant import names_in_kernel, plant_model
-from deadtime.estimation.methods._commanded_model import Assumed, CommandedModel, commanded_model
-from deadtime.estimation.methods._conclusion import (
-    check_fit,
-    concluded,
-    is_exact,
-    without_vanishing,
-)
-from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
+from deadtime.estimation.methods._commanded_model import GivenFilter
+from deadtime.estimation.methods._method import Method, Run
 from deadtime.loops import ControlLoop
 
 #: Residuals of a first fit below which, as a share of the range of the output, all may be rounding.
@@ -87,29 +83,28 @@ class OutputError(Method):
     joint: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        check_initial_output(self.initial_output)
-        check_choice("air", self.air, ("command", "vehicle"))
-        check_choice("intervals", self.intervals, ("all", "sum"))
-        known_filter(self.output_filter)
+        base.check_initial_output(self.initial_output)
+        base.check_choice("air", self.air, ("command", "vehicle"))
+        base.check_choice("intervals", self.intervals, ("all", "sum"))
+        commanded.known_filter(self.output_filter)
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the response of the plant to the logged commands."""
-        known = known_filter(self.output_filter)
-        if self.air == "vehicle" and not all(
-            plant_model(r.loop.plant, ()).integrates for r in runs
-        ):
+        known = commanded.known_filter(self.output_filter)
+        integrating = (plant_model(run.loop.plant, ()).integrates for run in runs)
+        if self.air == "vehicle" and not all(integrating):
             raise ValueError(
                 "air='vehicle' needs a plant such as Integrator, which "
                 "integrates the effect of its motors: use air='command'"
             )
-        assumed = Assumed(
+        assumed = commanded.Assumed(
             self.initial_output, output_filter=known, air=self.air, intervals=self.intervals
         )
         return estimate_from_commands(self.name, runs, free, assumed)
 
 
 def estimate_from_commands(
-    method: str, runs: Sequence[Run], free: Sequence[str], assumed: Assumed
+    method: str, runs: Sequence[Run], free: Sequence[str], assumed: commanded.Assumed
 ) -> DelayEstimate:
     """Fit the response to the command: logged, or computed from the recorded output.
 
@@ -136,19 +131,19 @@ def _criterion(estimate: DelayEstimate) -> float:
 
 
 def _estimated(
-    method: str, runs: Sequence[Run], free: Sequence[str], assumed: Assumed
+    method: str, runs: Sequence[Run], free: Sequence[str], assumed: commanded.Assumed
 ) -> DelayEstimate:
     """The estimate in stages: commands, least squares, noise, intervals, tests."""
     names = _Names.of(free, runs[0].loop)
     begun = _begun(method, runs, names, assumed)
     if begun.is_exact:
         return begun.by_least_squares()
-    found = _likeliest(begun)
-    _check_delay(begun, found.profile)
-    adequacy = adequacy_of(found.profile)
-    adequacy = replace(adequacy, reasons=(*found.doubts, *adequacy.reasons))
-    without = _without_the_plant(begun, found.profile, adequacy)
-    return without or _concluded(begun, found, adequacy)
+    profile, doubts, fitted = _likeliest(begun)
+    _check_delay(begun, profile)
+    adequacy = flight.adequacy_of(profile)
+    adequacy = replace(adequacy, reasons=(*doubts, *adequacy.reasons))
+    without = _without_the_plant(begun, profile, adequacy)
+    return without or _concluded(begun, profile, fitted, adequacy)
 
 
 class _Names(NamedTuple):
@@ -199,8 +194,8 @@ class _Begun:
     method: str
     runs: Sequence[Run]
     names: _Names
-    assumed: Assumed
-    models: list[CommandedModel]
+    assumed: commanded.Assumed
+    models: list[commanded.CommandedModel]
     white: native.FlightFit
     numbers: dict[str, float]
     whole: native.FlightFit
@@ -244,32 +239,29 @@ class _Begun:
     def plain(self) -> tuple[Model, Minimum]:
         """Least squares with all its derivatives, from that of the likelihood."""
         model, found = solve_jointly([run.started(self.white, self.numbers) for run in self.models])
-        return model, without_vanishing(model, found)
+        return model, model.problem.without_vanishing(found, model.size)
 
     @property
     def is_exact(self) -> bool:
         """Whether least squares leaves rounding alone."""
         nearly = self.names.are_common and self.whole.leaves_less_than(NEARLY_EXACT)
-        return nearly and is_exact(*self.plain, self.fitted)
+        return nearly and base.is_exact(*self.plain, self.fitted)
 
     def by_least_squares(self) -> DelayEstimate:
         """The estimate of least squares."""
         model, found = self.plain
         start = [*found.point[len(self.names.common) :], math.nan][0]
         details, message = self.details(float(start)), f"least squares {self.message}"
-        return concluded(self.method, model, found, self.fitted, message=message, details=details)
+        return base.concluded(
+            self.method, model, found, self.fitted, message=message, details=details
+        )
 
 
-class _Likeliest(NamedTuple):
-    """The likeliest plant and noise, doubts about its commands, and the recordings with it."""
+def _likeliest(begun: _Begun) -> tuple[native.FlightProfile, tuple[str, ...], list[Run]]:
+    """The likeliest plant and noise, doubts about its commands, and the recordings with it.
 
-    profile: native.FlightProfile
-    doubts: tuple[str, ...]
-    fitted: list[Run]
-
-
-def _likeliest(begun: _Begun) -> _Likeliest:
-    """Plant, noise and intervals, with the numbers around them and the commands between rows."""
+    With the numbers around them and the commands between rows.
+    """
     models, fitted = begun.models, begun.fitted
     fit = begun.whole.beside_noise()
     numbers = covariance = None
@@ -292,7 +284,7 @@ def _likeliest(begun: _Begun) -> _Likeliest:
         "rows are further apart than samples, and the recording does "
         "not show at which times between rows the reference changes",
     )
-    return _Likeliest(profile, doubts * unclear, fitted)
+    return profile, doubts * unclear, fitted
 
 
 def _check_delay(begun: _Begun, profile: native.FlightProfile) -> None:
@@ -305,11 +297,11 @@ def _check_delay(begun: _Begun, profile: native.FlightProfile) -> None:
             "to this command. Check columns and units, or choose a longer window"
         )
     if not flight.gain_is_certain(profile):
-        check_fit(*begun.plain, begun.fitted)
+        base.check_fit(*begun.plain, begun.fitted)
 
 
 def _without_the_plant(
-    begun: _Begun, profile: native.FlightProfile, adequacy: Adequacy
+    begun: _Begun, profile: native.FlightProfile, adequacy: flight.Adequacy
 ) -> DelayEstimate | None:
     """The estimate of least squares where the noise stands for what the plant lacks."""
     astray = adequacy.reasons and profile.fit.explains_less(begun.whole)
@@ -324,33 +316,25 @@ def _without_the_plant(
     return None
 
 
-def _concluded(begun: _Begun, found: _Likeliest, adequacy: Adequacy) -> DelayEstimate:
+def _concluded(
+    begun: _Begun, profile: native.FlightProfile, fitted: list[Run], adequacy: flight.Adequacy
+) -> DelayEstimate:
     """The estimate of the likelihood; of rounded rows alone, with each as an interval."""
-    profile, message = found.profile, f"maximum likelihood {begun.message}"
+    message = f"maximum likelihood {begun.message}"
     if adequacy.coloured:
         profile = profile.coloured()
         message += ", with wider intervals because the residuals are coloured also at rest"
+    fit, details = profile.fit, begun.details(profile.fit.initial_output)
     estimate = flight.concluded_flight(
-        begun.method,
-        begun.names.linear,
-        found.fitted,
-        profile,
-        message,
-        begun.details(profile.fit.initial_output),
-        adequacy,
+        begun.method, begun.names.linear, fitted, profile, message, details, adequacy
     )
     plain = begun.names.are_common and profile.is_plain and not adequacy.coloured
-    if (
-        plain
-        and not profile.fit.is_long
-        and estimate.verdict == "reliable"
-        and profile.fit.is_rounding_alone
-    ):
+    if plain and not fit.is_long and estimate.verdict == "reliable" and fit.is_rounding_alone:
         return flight.read_as_intervals(estimate, begun.models)
     return estimate
 
 
-def _begun(method: str, runs: Sequence[Run], names: _Names, assumed: Assumed) -> _Begun:
+def _begun(method: str, runs: Sequence[Run], names: _Names, assumed: commanded.Assumed) -> _Begun:
     """Least squares on recordings, with gaps in their commands or without if that is likelier."""
     begun = _begun_with(method, runs, names, assumed)
     if any(model.commands.lost for model in begun.models):
@@ -359,9 +343,11 @@ def _begun(method: str, runs: Sequence[Run], names: _Names, assumed: Assumed) ->
     return begun
 
 
-def _begun_with(method: str, runs: Sequence[Run], names: _Names, assumed: Assumed) -> _Begun:
+def _begun_with(
+    method: str, runs: Sequence[Run], names: _Names, assumed: commanded.Assumed
+) -> _Begun:
     """Least squares on recordings whose commands are as `assumed`."""
-    models = [commanded_model(run, names.common, assumed) for run in runs]
+    models = [commanded.commanded_model(run, names.common, assumed) for run in runs]
     _check_others(names.others, models[0].known)
     rows, known = [model.rows for model in models], models[0].known
     given = partial(_given, names, assumed, models, rows)
@@ -388,8 +374,8 @@ def _check_others(names: Sequence[str], known: Mapping[str, float]) -> None:
 
 def _given(
     names: _Names,
-    assumed: Assumed,
-    models: Sequence[CommandedModel],
+    assumed: commanded.Assumed,
+    models: Sequence[commanded.CommandedModel],
     rows: Sequence[native.FlightRows],
     found: Sequence[float],
 ) -> tuple[native.FlightPlant, list[native.FlightRows]]:
@@ -399,3 +385,14 @@ def _given(
         plant = plant._replace({**plant.parameters, **values})
     within = [model.limited(part, values) for model, part in zip(models, rows, strict=True)]
     return plant_model(plant, names.linear, assumed.air == "vehicle"), within
+
+
+def on_regular_times(run: Run) -> Run | None:
+    """The run with the regular times that its stamps scatter around; None where there are none."""
+    check, sample_time, recording = run.check, run.loop.sample_time, run.recording
+    if check is None or check.stamps != "jittered":
+        return None
+    if sample_time is None or recording.sent is not None:
+        return None
+    regular = native.regular_times(recording.time, sample_time * (check.rate_ratio or 1))
+    return None if regular is None else run._replace(recording=replace(recording, time=regular))

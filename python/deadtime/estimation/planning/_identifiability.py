@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
+import deadtime.estimation.planning._planned_bound as planned
 from deadtime._base.digits import stated
 from deadtime._base.drawing import Axes, Figure, empty_figure
 from deadtime._base.errors import NotIdentifiableError
@@ -16,19 +18,13 @@ from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Progress
 from deadtime._base.validation import finite, positive, whole_number
 from deadtime.estimation._estimate import estimate_delay, method_of
+from deadtime.estimation._least_squares import unit_of
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
-from deadtime.estimation.fit._profile import unit_of
-from deadtime.estimation.methods._cta import CTA
-from deadtime.estimation.methods._grid import Grid
 from deadtime.estimation.methods._method import Method
 from deadtime.estimation.methods._output_error import OutputError
-from deadtime.estimation.methods._waveform import Waveform
+from deadtime.estimation.methods._waveform import CTA, Grid, Waveform
 from deadtime.estimation.planning._monte_carlo import SLOW, MonteCarlo, Trials, with_sums
-from deadtime.estimation.planning._planned_bound import (
-    PlannedBound,
-    bound_with_command,
-    bound_with_reference,
-)
+from deadtime.estimation.planning._planned_bound import PlannedBound
 from deadtime.experiments import Experiment, FlightNoise, NoiseModel
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
@@ -324,7 +320,11 @@ def identifiability(
     known = tuple(dict.fromkeys([*VEHICLE_PARAMETERS, *loop.plant.parameters]))
     names = checked_names(free, loop, known)
     noise = _noise_with_covariance(noise)
-    _checked_start(initial_output)
+    if initial_output is not None and finite("initial_output", initial_output) != 0.0:
+        raise ValueError(
+            f"initial_output={initial_output}: an experiment starts at rest, with an output "
+            "of zero. Give 0.0 if the start is known, or None if the start is fitted"
+        )
     count = whole_number("runs", runs, least=0)
     offset = initial_output is None
     run_loop = experiment.loop_in_run(loop)
@@ -333,40 +333,23 @@ def identifiability(
     seeds = np.random.SeedSequence(seed).spawn(count)
     recordings = [experiment.run(loop, noise, number) for number in seeds] or [recording]
     asked = run_loop, names, offset, noise
-    cases = {
-        "command logged": partial(bound_with_command, *asked, recordings),
-        "reference only": partial(bound_with_reference, *asked, experiment, recording),
-    }
-    (logged, alone), remarks = _found(cases)
+    remarks: list[str] = []
+
+    def found(label: str, of: Callable[..., PlannedBound], *given: Any) -> PlannedBound | None:
+        """A bound, or a remark why there is none."""
+        try:
+            return of(*asked, *given)
+        except (NotIdentifiableError, ValueError) as refusal:
+            remarks.append(f"{label}: {refusal}")
+        return None
+
+    logged = found("command logged", planned.bound_with_command, recordings)
+    alone = found("reference only", planned.bound_with_reference, experiment, recording)
     if logged is None and (alone is None or run_loop.is_sampled):
         raise NotIdentifiableError("; ".join(remarks))
     return Identifiability(
         loop, experiment, names, noise, initial_output, recording, logged, alone, tuple(remarks)
     )
-
-
-def _found(
-    cases: Mapping[str, Callable[[], PlannedBound]],
-) -> tuple[list[PlannedBound | None], list[str]]:
-    """The bound of each case, None where it determines nothing, and why not."""
-    found: list[PlannedBound | None] = []
-    remarks = []
-    for label, bound in cases.items():
-        try:
-            found.append(bound())
-        except (NotIdentifiableError, ValueError) as refusal:
-            found.append(None)
-            remarks.append(f"{label}: {refusal}")
-    return found, remarks
-
-
-def _checked_start(initial_output: float | None) -> None:
-    """Refuse a known output at the start that is not that of an experiment."""
-    if initial_output is not None and finite("initial_output", initial_output) != 0.0:
-        raise ValueError(
-            f"initial_output={initial_output}: an experiment starts at rest, with an output "
-            "of zero. Give 0.0 if the start is known, or None if the start is fitted"
-        )
 
 
 def _noise_with_covariance(noise: float | FlightNoise) -> FlightNoise:

@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,8 +21,8 @@ from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.processes import shared_out
 from deadtime._base.progress import Progress
 from deadtime._base.validation import confidence, whole_number
+from deadtime.estimation._least_squares import unit_of
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.fit._profile import unit_of
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
@@ -76,11 +76,9 @@ class MonteCarlo(ReadOnlyArrays):
             f"  {'':<20}{'rmse':>20}{'bias':>20}{'mean bound':>12}{'coverage':>14}",
         ]
         for name, rmse in self.rmse.items():
-            unit, count = unit_of(name), self.estimates[name].size
-            error = self._error(name)
-            bias = stated(
-                self.bias[name], float(np.std(self.estimates[name])) / math.sqrt(count), unit
-            )
+            unit, error, count = unit_of(name), self._error(name), self.estimates[name].size
+            deviation = float(np.std(self.estimates[name])) / math.sqrt(count)
+            bias = stated(self.bias[name], deviation, unit)
             bound = held = "-"
             if name in self.mean_bound:
                 bound = shown(self.mean_bound[name], error, unit)
@@ -107,13 +105,6 @@ class MonteCarlo(ReadOnlyArrays):
         return f"<MonteCarlo of {self.method}: {self.runs} runs, rmse {errors}>"
 
 
-#: Simulates the recording of one run from its seed.
-Simulate: TypeAlias = Callable[[np.random.SeedSequence], Recording]
-
-#: Estimates from it.
-Estimate: TypeAlias = Callable[[Recording], DelayEstimate]
-
-
 class _Outcome(NamedTuple):
     """Result of one run: estimates, bounds, whether intervals held the truth; or the refusal."""
 
@@ -127,8 +118,8 @@ class Trials(NamedTuple):
     """How each of many runs is simulated, from one seed, and estimated, and the truth."""
 
     truth: Mapping[str, float]
-    simulate: Simulate
-    estimate: Estimate
+    simulate: Callable[[np.random.SeedSequence], Recording]
+    estimate: Callable[[Recording], DelayEstimate]
     seed: int
     level: float
 
@@ -144,9 +135,8 @@ class Trials(NamedTuple):
             fitted = with_sums(fit.loop)
             values = {name: fitted[name] for name in fit.stderr}
             bounds = {} if fit.crb is None else {name: fit.crb.stderr[name] for name in values}
-            held = {}
-            if fit.calibrated:
-                held = {name: _holds(fit, name, self.truth[name], self.level) for name in values}
+            claimed = values if fit.calibrated else ()
+            held = {name: _holds(fit, name, self.truth[name], self.level) for name in claimed}
             return _Outcome(values, bounds, held)
         except DeadtimeError as refusal:
             return _Outcome({}, {}, {}, str(refusal))
@@ -155,7 +145,31 @@ class Trials(NamedTuple):
         """Simulate and estimate `runs` times, and collect the statistics."""
         count = whole_number("runs", runs)
         confidence(self.level)
-        return _summed_up(method, self, shared_out(self.outcomes, count, processes, progress))
+        outcomes = shared_out(self.outcomes, count, processes, progress)
+        answered = [outcome for outcome in outcomes if not outcome.refusal]
+        # Numbers are left out, so that equal reasons are counted together.
+        refusals = [outcome.refusal for outcome in outcomes if outcome.refusal]
+        reasons = Counter(re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", why) for why in refusals)
+        if not answered:
+            raise NotIdentifiableError(
+                f"all {len(outcomes)} runs were refused. The most "
+                f"frequent reason: {reasons.most_common(1)[0][0]}"
+            )
+        truth = {name: self.truth[name] for name in answered[0].values}
+        estimates = {name: np.array([run.values[name] for run in answered]) for name in truth}
+        errors = {name: estimates[name] - truth[name] for name in truth}
+        return MonteCarlo(
+            method=method,
+            runs=len(outcomes),
+            truth=truth,
+            estimates=estimates,
+            rmse={name: float(np.sqrt(np.mean(error**2))) for name, error in errors.items()},
+            bias={name: float(np.mean(error)) for name, error in errors.items()},
+            mean_bound=_means([run.bounds for run in answered]),
+            level=self.level,
+            coverage=_means([run.held for run in answered]),
+            failures=dict(reasons.most_common()),
+        )
 
 
 def _holds(fit: DelayEstimate, name: str, truth: float, level: float) -> bool:
@@ -181,33 +195,6 @@ def with_sums(loop: ControlLoop) -> dict[str, float]:
     if "time_constant" in values:
         sums["delay+time_constant"] = values["delay"] + values["time_constant"]
     return values | sums
-
-
-def _summed_up(method: str, trials: Trials, outcomes: list[_Outcome]) -> MonteCarlo:
-    answered = [outcome for outcome in outcomes if not outcome.refusal]
-    # Numbers are left out, so that equal reasons are counted together.
-    refusals = [outcome.refusal for outcome in outcomes if outcome.refusal]
-    reasons = Counter(re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", refusal) for refusal in refusals)
-    if not answered:
-        raise NotIdentifiableError(
-            f"all {len(outcomes)} runs were refused. The most "
-            f"frequent reason: {reasons.most_common(1)[0][0]}"
-        )
-    truth = {name: trials.truth[name] for name in answered[0].values}
-    estimates = {name: np.array([run.values[name] for run in answered]) for name in truth}
-    errors = {name: estimates[name] - truth[name] for name in truth}
-    return MonteCarlo(
-        method=method,
-        runs=len(outcomes),
-        truth=truth,
-        estimates=estimates,
-        rmse={name: float(np.sqrt(np.mean(error**2))) for name, error in errors.items()},
-        bias={name: float(np.mean(error)) for name, error in errors.items()},
-        mean_bound=_means([run.bounds for run in answered]),
-        level=trials.level,
-        coverage=_means([run.held for run in answered]),
-        failures=dict(reasons.most_common()),
-    )
 
 
 def _means(each: Sequence[Mapping[str, float]]) -> dict[str, float]:

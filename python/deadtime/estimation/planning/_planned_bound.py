@@ -41,10 +41,9 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._plant import disturbances_of, names_in_kernel, whitened
 from deadtime.estimation._result import CramerRaoBound
 from deadtime.estimation.data._checks import QUOTIENT, check_distinguishable, standard_errors
-from deadtime.estimation.likelihood._disturbances import disturbances_of, whitened
-from deadtime.estimation.likelihood._plant import names_in_kernel
 from deadtime.experiments import Experiment, FlightNoise, RandomProcess, check_reads_samples
 from deadtime.loops import ControlLoop, P, Plant
 from deadtime.recordings import Recording

@@ -10,15 +10,14 @@ from typing import Any
 
 import numpy as np
 
-import deadtime.estimation.running._settings as settings
+import deadtime.estimation.running._bank as bank
 from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.validation import finite, non_negative, positive
-from deadtime._base.verdicts import Verdict
 from deadtime.estimation._estimate import estimate_delay
 from deadtime.estimation._native import BankAnswer, OnlineBank
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.methods._output_error import OutputError
-from deadtime.estimation.running._estimate import OnlineEstimate, estimate_of
+from deadtime.estimation.running._bank import OnlineEstimate
 from deadtime.experiments import FlightNoise, Noise
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
@@ -33,8 +32,8 @@ LEARN, LAST = 10.0, 30.0
 #: Fewest rows that the noise is learned from.
 FEWEST = 40
 
-#: So many changes within so many seconds are not those of a delay.
-RESTLESS, MINUTE = 3, 60.0
+#: Changes count for so many seconds.
+MINUTE = 60.0
 
 #: After so many seconds in doubt, a change is one of what the plant lacks. A jump of the delay
 #: itself is found sooner; a longer time reports more changes that are none.
@@ -152,29 +151,25 @@ class OnlineEstimator:
         level: float = 0.95,
     ) -> None:
         self._loop = loop
-        points = settings.points_of_range("delays", delays, settings.DELAYS)
-        self._lags = None if lags is None else settings.points_of_range("lags", lags, settings.LAGS)
-        model = settings.linear_plant(loop, ("delay", "gain"))
+        points = bank.points_of_range("delays", delays, bank.DELAYS)
+        self._lags = None if lags is None else bank.points_of_range("lags", lags, bank.LAGS)
+        model = bank.linear_plant(loop, ("delay", "gain"))
         known = loop.parameters.get("gain")
         size = abs(known) if known else 1.0
-        self._settings = settings.BankSettings(
-            num=model.num,
-            den=model.den,
-            air_behind_lags=model.air_behind_lags,
-            own_lag=model.own_lag,
+        self._settings = bank.BankSettings(
+            plant=model,
             delays=points.tolist(),
-            follow=settings.is_range(delays),
+            follow=bank.is_range(delays),
             layers=[
-                (tau, model.zero, [0.0] * points.size)
-                for tau in settings.lag_sets(model, self._lags)
+                (tau, model.zero, [0.0] * points.size) for tau in bank.lag_sets(model, self._lags)
             ],
             gain=(float(known or 1.0), 0.5 * size) if gain is None else gain,
             memory=positive("memory", memory),
             drift=non_negative("drift", drift),
             gain_walk=non_negative("gain_drift", gain_drift * size),
             width=positive("width", width),
-            alarm=settings.alarm_of(false_alarms_per_hour),
-            every=settings.coarser(points),
+            alarm=bank.alarm_of(false_alarms_per_hour),
+            every=bank.coarser(points),
             at_rest=at_rest,
             level=level,
             freedom=GIVEN,
@@ -211,11 +206,10 @@ class OnlineEstimator:
         OnlineEstimator
         """
         noise = options.pop("noise", None)
-        fitted = fit.noise if fit.noise is not None else FlightNoise(white=fit.rms)
         error = fit.stderr.get("lag", 0.0)
         if "lags" not in options and fit.lag and error > 0.0 and math.isfinite(error):
             low = max(fit.lag - AROUND * error, 0.1 * fit.lag)
-            options["lags"] = (low, fit.lag + AROUND * error, settings.LAGS)
+            options["lags"] = (low, fit.lag + AROUND * error, bank.LAGS)
         options.setdefault("delays", (0.0, max(RANGE[1], BEYOND * fit.delay)))
         spread = fit.stderr.get("gain", 0.0)
         if fit.gain and "gain" not in options and 0.0 < spread < math.inf:
@@ -228,10 +222,7 @@ class OnlineEstimator:
                 for (lags, zero, flat), weight in zip(found._settings.layers, prior, strict=True)
             ]
             found._settings = found._settings._replace(layers=layers)
-        found._settings = found._settings._replace(freedom=_freedom_of(fit))
-        if fit.verdict != "reliable":
-            found._doubts = (f"the initial fit of the estimator was not reliable ({fit.message})",)
-        found._begin(fitted if noise is None else _flight_noise(noise))
+        found._begin_after(fit, "the initial fit of the estimator", noise)
         return found
 
     @property
@@ -313,18 +304,15 @@ class OnlineEstimator:
 
     def _estimate(self, answer: BankAnswer) -> OnlineEstimate:
         assert self._noise is not None
-        found = estimate_of(answer, self._noise.white, self.delays, self._doubts)
-        if found.changed:
-            self._changes.append(found.time)
-        self._changes = [time for time in self._changes if time > found.time - MINUTE]
-        is_restless = len(self._changes) >= RESTLESS
-        if is_restless:
-            count = len(self._changes)
-            reason = f"not reliable: {count} changes in a minute, so the plant model is incomplete"
-            message = f"{found.message}; {reason}" if found.message else reason
-            verdict: Verdict = "indication" if found.known else "none"
-            found = replace(found, verdict=verdict, message=message)
-        in_doubt = is_restless or found.time - self._doubted_since > IN_DOUBT
+        if answer.changed:
+            self._changes.append(answer.time)
+        self._changes = [time for time in self._changes if time > answer.time - MINUTE]
+        found = bank.estimate_of(
+            answer, self._noise.white, self.delays, self._doubts, changes=len(self._changes)
+        )
+        in_doubt = (
+            len(self._changes) >= bank.RESTLESS or found.time - self._doubted_since > IN_DOUBT
+        )
         # The kernel forgets its doubts at a change: they begin again after the next rows.
         if found.verdict == "indication":
             self._doubted_since = min(self._doubted_since, found.time)
@@ -335,6 +323,15 @@ class OnlineEstimator:
     def _begin(self, noise: FlightNoise) -> None:
         self._bank = OnlineBank(self._settings.under(noise))
         self._noise = noise
+
+    def _begin_after(self, fit: DelayEstimate, what: str, noise: Noise | None = None) -> None:
+        """Begin with the noise of a fit, or with one that was given."""
+        freedom = min(MOST_FITTED, float(fit.residuals.size))
+        self._settings = self._settings._replace(freedom=freedom)
+        if fit.verdict != "reliable":
+            self._doubts = (f"{what} was not reliable ({fit.message})",)
+        fitted = FlightNoise(white=fit.rms) if fit.noise is None else fit.noise
+        self._begin(fitted if noise is None else _flight_noise(noise))
 
     def _learn(self, time: float, output: float | None, command: float | None) -> OnlineEstimate:
         """Keep a row until the noise is known; then go over all that were kept."""
@@ -359,7 +356,7 @@ class OnlineEstimator:
                 if fit.verdict == "reliable" or time - self._rows[0][0] >= LAST:
                     return self._replay(fit)
                 self._reason = fit.message
-        found = estimate_of(self._blank.row(time), self._settings.white, self.delays)
+        found = bank.estimate_of(self._blank.row(time), self._settings.white, self.delays)
         return replace(found, message=f"no estimate yet: {self._reason}")
 
     def _forget(self, time: float) -> None:
@@ -383,11 +380,7 @@ class OnlineEstimator:
 
     def _replay(self, fit: DelayEstimate) -> OnlineEstimate:
         """Begin with the noise of a fit, and give the bank what was kept."""
-        noise = fit.noise if fit.noise is not None else FlightNoise(white=fit.rms)
-        self._settings = self._settings._replace(freedom=_freedom_of(fit))
-        if fit.verdict != "reliable":
-            self._doubts = (f"the fit of the first {LAST:.0f} s was not reliable ({fit.message})",)
-        self._begin(noise)
+        self._begin_after(fit, f"the fit of the first {LAST:.0f} s")
         assert self._bank is not None
         for time, output in self._rows:
             while self._commands and self._commands[0][0] < time:
@@ -397,11 +390,6 @@ class OnlineEstimator:
             self._bank.command(*self._commands.popleft())
         self._rows.clear()
         return self._estimate(answer)
-
-
-def _freedom_of(fit: DelayEstimate) -> float:
-    """Rows that count for the deviation of the noise of a fit."""
-    return min(MOST_FITTED, float(fit.residuals.size))
 
 
 def _flight_noise(noise: Noise) -> FlightNoise:

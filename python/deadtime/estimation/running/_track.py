@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -14,15 +15,15 @@ from deadtime._base.digits import between
 from deadtime._base.drawing import Axes, shown_axes
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import claimed
-from deadtime.estimation.running._estimate import OnlineEstimate
+from deadtime.estimation.running._bank import OnlineEstimate
 from deadtime.estimation.running._estimator import OnlineEstimator
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
 #: What a track takes over from its estimates.
-NUMBERS = ("time", "delay", "lag", "delay_plus_lag", "gain")
-MARKS = ("known", "informed", "changed")
+NAMES = ("time", "delay", "lag", "delay_plus_lag", "gain", "known", "informed", "changed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +84,7 @@ class DelayTrack(ReadOnlyArrays):
 
         ends = np.array([estimate.ci for estimate in estimates])
         columns: dict[str, Any] = {
-            name: np.array([getattr(estimate, name) for estimate in estimates], dtype=kind)
-            for names, kind in ((NUMBERS, float), (MARKS, bool))
-            for name in names
+            name: np.array([getattr(estimate, name) for estimate in estimates]) for name in NAMES
         }
         columns["reliable"] = np.array([estimate.verdict == "reliable" for estimate in estimates])
         return cls(low=ends[:, 0], high=ends[:, 1], last=estimates[-1], **columns)
@@ -163,11 +162,7 @@ class DelayTrack(ReadOnlyArrays):
 
 
 def online(
-    recording: Recording,
-    loop: ControlLoop,
-    *,
-    window: tuple[float | None, float | None] | None = None,
-    **options: Any,
+    recording: Recording, loop: ControlLoop, *, window: OpenRange | None = None, **options: Any
 ) -> DelayTrack:
     """The delay over a recording, as it would have been known at each row.
 
@@ -210,9 +205,7 @@ def online(
 
 
 def track_of(
-    estimator: OnlineEstimator,
-    recording: Recording,
-    window: tuple[float | None, float | None] | None = None,
+    estimator: OnlineEstimator, recording: Recording, window: OpenRange | None = None
 ) -> DelayTrack:
     """Give an estimator the rows and commands of a recording."""
     part = recording if window is None else recording.window(*window)
@@ -225,11 +218,10 @@ def track_of(
             "the recording has no command, but the online estimate is the "
             "delay from the command to the output: record the command too"
         )
-    found, place = [], 0
+    found, commands = [], deque(zip(time.tolist(), values.tolist(), strict=True))
     for row, output in zip(part.time.tolist(), part.output.tolist(), strict=True):
-        while place < time.size and time[place] < row:
-            estimator.command(float(time[place]), float(values[place]))
-            place += 1
+        while commands and commands[0][0] < row:
+            estimator.command(*commands.popleft())
         if not math.isnan(output):
             found.append(estimator.update(row, output))
     return DelayTrack.of(found)

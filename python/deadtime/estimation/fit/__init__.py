@@ -1,1 +1,0 @@
-"""Least squares, profile likelihood, and tests of residuals."""

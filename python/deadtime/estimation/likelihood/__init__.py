@@ -1,1 +1,0 @@
-"""Maximum likelihood under the noise of a flight: air, trim, coloured and white sensor noise."""
