@@ -2,8 +2,9 @@
 
 Each session flies without an added wait first and last, and waits drawn between 0 and `LONGEST`
 seconds between. Two answers rise by the wait. One is the sum of delay and lag of the plant behind
-the limits of the vehicle. The other is the equivalent delay of a plant that nobody named. The mean
-of each without a wait is taken from the others. What is left is held against how long commands
+the limits of the vehicle. The other is the equivalent delay of a plant that nobody named, behind
+the limits that the parameters of the vehicle say. The mean of each without a wait is taken from
+the others. What is left is held against how long commands
 waited on the clock of the vehicle. The estimates do not know that.
 """
 
@@ -23,7 +24,7 @@ import numpy as np
 
 from reality.dataflash import recording_of, waited
 from reality.firmware import Estimated, estimated, facts_of, fly, line
-from reality.flights import GAINS, LIMIT, WINDS, Flight
+from reality.flights import GAINS, SHAPING, WINDS, Flight
 
 #: Longest wait that is drawn, s.
 LONGEST = 0.4
@@ -91,7 +92,8 @@ def answers(folder: Path, flight: Flight) -> Answers:
     delays = tuple(math.nan for _ in FREQUENCIES)
     ends = tuple((math.nan, math.nan) for _ in FREQUENCIES)
     try:
-        fit = dtm.estimate_delay(recording, controller=dtm.P(GAINS[flight.axis]), limit=LIMIT)
+        acceleration, jerk = (facts["parameters"][name] for name in SHAPING[flight.axis])
+        fit = dtm.estimate_delay(recording.behind_limits(0.01 * acceleration, jerk))
         verdict, plant = fit.verdict, fit.best.name
         if verdict != "none":
             view, omega = fit.at(FREQUENCIES), np.array(FREQUENCIES)

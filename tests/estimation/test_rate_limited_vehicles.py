@@ -88,6 +88,35 @@ def test_intervals_cover():
     assert np.mean(held, axis=0).min() >= 0.82  # 33 of 40: one in 300 by chance
 
 
+FREQUENCIES = np.array([1.0, 2.0, 3.0])
+
+
+def behind_limits(seed):
+    """Is a fit of no named plant reliable, and are gain and phase within their intervals?"""
+    flight = recorded(seed).behind_limits(TRUTH["rate"], TRUTH["rate_of_rate"])
+    fit = dtm.estimate_delay(flight)
+    w = FREQUENCIES
+    gain = TRUTH["gain"] / (w * np.hypot(1.0, TRUTH["lag"] * w))
+    phase = -0.5 * np.pi - np.arctan(TRUTH["lag"] * w) - TRUTH["delay"] * w
+    view = fit.at(w)
+    found = [
+        (ends[0] <= value) & (value <= ends[1])
+        for ends, value in ((view.gain_ci, gain), (view.phase_ci, phase))
+    ]
+    return fit.verdict == "reliable", np.concatenate(found)
+
+
+@pytest.mark.parametrize("flights", [2, pytest.param(40, marks=pytest.mark.survey)])
+def test_behind_given_limits_no_plant_has_to_be_named(flights):
+    found = [behind_limits(seed) for seed in range(300, 300 + flights)]
+    reliable = [one for one, _ in found]
+    held = np.mean([inside for _, inside in found], axis=0)
+    print(f"reliable {sum(reliable)} of {flights}, held {held}")
+    assert np.mean(reliable) >= 0.9
+    assert held.min() >= 0.82 or flights < 40  # 33 of 40: one in 300 by chance
+    assert held.mean() >= 0.75
+
+
 @pytest.mark.parametrize("method", ["waveform", "gcc", "frequency", "overshoot"])
 def test_other_methods_refuse_such_a_plant(method):
     with pytest.raises(ValueError, match="limits the rate of its command"):

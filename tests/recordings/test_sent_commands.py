@@ -33,6 +33,25 @@ def test_a_window_keeps_the_commands_before_it():
     assert found.window(1.0, 1.9) == found
 
 
+@pytest.mark.parametrize("rate_of_rate", [None, 5.0])
+def test_commands_behind_limits_are_those_of_a_limited_plant(rate_of_rate):
+    plant = dtm.RateLimited(dtm.Integrator(), 1.5, rate_of_rate)
+    held = dtm.Recording(TIME, np.zeros(20), TIME**2, np.sin(TIME))
+    for one, sent in ((recording(), SENT), (held, (TIME, np.sin(TIME)))):
+        found = one.behind_limits(1.5, rate_of_rate)
+        time, command = plant.limited(*sent)
+        assert found.sent.time.tolist() == time.tolist()
+        assert found.sent.values.tolist() == command.tolist()
+        assert found.output.tolist() == one.output.tolist()
+
+
+def test_limits_need_a_command_and_are_above_zero():
+    with pytest.raises(dtm.RecordingError, match="no command"):
+        dtm.Recording(TIME, np.zeros(20), TIME**2).behind_limits(1.0)
+    with pytest.raises(ValueError, match="rate=0: give a finite number above zero"):
+        recording().behind_limits(0.0)
+
+
 @pytest.mark.parametrize("ending", [".csv", ".parquet"])
 def test_it_is_saved_bit_for_bit(tmp_path, ending):
     if ending == ".parquet":

@@ -2,4 +2,5 @@
 
 from deadtime._deadtime import (
     csv_columns as csv_columns,
+    rate_limited as rate_limited,
 )

@@ -13,6 +13,7 @@ from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.validation import OpenRange, open_interval, unmasked
 from deadtime.recordings._missing import HELD, rows_with_output, with_rows_missing
+from deadtime.recordings._native import rate_limited
 
 if TYPE_CHECKING:
     from deadtime.loops import ControlLoop
@@ -259,6 +260,62 @@ class Recording(ReadOnlyArrays):
         held = HELD if self.sent is None else ("reference",)
         kept = rows_with_output(self.output, {key: columns[key] for key in held if key in columns})
         return self if kept is None else self._part(kept)
+
+    def behind_limits(self, rate: float, rate_of_rate: float | None = None) -> Recording:
+        """The recording with commands that follow its own within limits, as in many vehicles.
+
+        An estimate from it is that of the linear plant behind the limits, which you need not name.
+        The commands start at rest at the first one, and hold between the times in `sent`.
+
+        Parameters
+        ----------
+        rate : float
+            Largest rate of change of the command, in its unit per s.
+        rate_of_rate : float, optional
+            Largest change of that rate, in the unit of the command per s²; none by default.
+
+        Returns
+        -------
+        Recording
+            With `sent`: the means of the limited command over parts of the time between commands.
+
+        Raises
+        ------
+        RecordingError
+            When the recording has no command.
+        ValueError
+            If a limit is not above zero.
+
+        See Also
+        --------
+        RateLimited : the same limits in a loop, with the formula.
+
+        Examples
+        --------
+        A vehicle limits the acceleration to 1 m/s² and the jerk to 5 m/s³:
+
+        >>> import numpy as np
+        >>> import deadtime as dtm
+        >>> t = np.arange(500) * 0.05
+        >>> told = 0.8 * np.sign(np.sin(0.9 * t) + np.sin(0.37 * t))
+        >>> limited = dtm.Recording(t, None, np.zeros(500), told).behind_limits(1.0, 5.0)
+        >>> plant = dtm.FactoredPlant([0.15], integrator=True).transfer_function() * dtm.delay(0.2)
+        >>> sent = limited.sent
+        >>> height = plant.simulate(t, sent.values, input_time=sent.time).outputs
+        >>> height = height + 0.002 * np.random.default_rng(1).standard_normal(500)
+        >>> flight = dtm.Recording(t, None, height, told)
+        >>> fit = dtm.estimate_delay(flight.behind_limits(1.0, 5.0))
+        >>> fit.verdict, round(fit.delay, 2)
+        ('reliable', 0.2)
+        """
+        if self.sent is not None:
+            time, command = self.sent
+        elif self.command is not None:
+            time, command = self.time, self.command
+        else:
+            raise RecordingError("the recording has no command that a vehicle could limit")
+        sent = rate_limited(time, command, rate, np.inf if rate_of_rate is None else rate_of_rate)
+        return replace(self, command=None, sent=sent)
 
     def check(self, loop: ControlLoop, window: OpenRange | None = None) -> RecordingCheck:
         """Check the recording against the loop that made it, before anything is fitted.
