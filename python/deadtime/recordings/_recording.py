@@ -315,7 +315,7 @@ class Recording(ReadOnlyArrays):
         else:
             raise RecordingError("the recording has no command that a vehicle could limit")
         sent = rate_limited(time, command, rate, np.inf if rate_of_rate is None else rate_of_rate)
-        return replace(self, command=None, sent=sent)
+        return replace(self, command=None, sent=SentCommands(*sent))
 
     def check(self, loop: ControlLoop, window: OpenRange | None = None) -> RecordingCheck:
         """Check the recording against the loop that made it, before anything is fitted.
