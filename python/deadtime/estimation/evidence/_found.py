@@ -167,7 +167,8 @@ REMEDIES = {
     "upper limit": "give the controller this limit of the command",
     "lower limit": "give the controller this limit of the command",
     "rate limit": "give the loop this limit of the command's rate",
-    "slope limit": "keep commands below this limit, or give the plant this limit",
+    "slope limit": "keep commands below this limit, or give the vehicle's limits: "
+    "recording.behind_limits(rate, rate_of_rate)",
     "drag": "use the gain only for speeds that occur in this recording",
     "gain ramp": "find out why the gain changes, for example with the battery or the temperature",
     "gain by level": "record around the output at which the loop has to work",
