@@ -200,7 +200,7 @@ def test_noise_alone_is_no_response():
         ({"output": np.full(40, np.nan)}, "only 0 rows with a known output"),
         ({"largest_delay": -1.0}, "the largest delay is -1"),
         ({"plant": "lags"}, 'plant "lags" is not known'),
-        ({"between": "steps"}, 'kind "steps"'),
+        ({"between": "steps"}, 'between "steps"'),
         ({"level": 2.0}, "the level is 2"),
     ],
 )

@@ -322,3 +322,24 @@ def test_other_intervals_wait_until_they_are_asked_for():
         assert total.ci(0.95, name) == pytest.approx(whole.ci(0.95, name), abs=1e-4)
     with pytest.raises(ValueError, match="intervals"):
         dtm.estimation.OutputError(intervals="none")
+
+
+@pytest.mark.parametrize("kind", [dtm.Integrator, dtm.FirstOrder])
+def test_a_subclass_of_a_plant_is_fitted_like_it(kind):
+    class Own(kind):
+        pass
+
+    lag = "lag" if kind is dtm.Integrator else "time_constant"
+    found = []
+    for plant in (kind, Own):
+        loop = dtm.ControlLoop(plant(1.0, **{lag: 0.3}), dtm.P(0.7), delay=0.25, sample_time=0.065)
+        time = np.arange(300) * 0.065
+        reference = np.where((time > 2.0) & (time < 10.0), 1.0, 0.0)
+        run = loop.simulate(time, reference, reference_time=time)
+        for output in (run.outputs, np.round(run.outputs, 2)):
+            recording = dtm.Recording(time, reference, output, run.inputs)
+            fit = dtm.estimate_delay(
+                recording, loop.replace(delay=None), free=("delay", "gain", lag)
+            )
+            found.append((fit.verdict, [fit.ci(0.95, name) for name in fit.free]))
+    assert found[:2] == found[2:]

@@ -1,17 +1,17 @@
 """Estimate the delay of a control loop from a recording, with a confidence interval.
 
 `estimate_delay` chooses and runs a method, `compare_methods` runs several, and `choose_plant`
-tries several plants. `identifiability` says before an experiment what it will tell, and
-`shared_number` combines estimates of one number, and `OnlineEstimator` follows the delay row by row
+tries several plants. `identifiability` says before an experiment what it will tell.
+`shared_number` combines estimates of one number. `OnlineEstimator` follows the delay row by row
 while the loop runs. Each method is a class that holds its options.
 """
 
-# The files. `_estimate` chooses and runs a method, `_compare` runs several, `_choose` tries several
-# plants, `_result` is what they return, `_shared` combines several. `evidence` finds the plant of a
-# recording without a loop. `methods` holds the methods, `data` what they read from a
-# recording, `_least_squares` models, profiles and residuals, `_plant` plant and noise as the kernel
-# takes them, `planning` the bounds of planned experiments, `running` what is estimated while a loop
-# runs.
+# `_estimate` chooses and runs a method, `_compare` runs several, and `_choose` tries several
+# plants. `_result` is what they return, `_felt` what a loop feels of it, and `_plots` draws it.
+# `_shared` combines several. `evidence` finds the plant of a recording without a loop. `methods`
+# holds the methods, and `data` what they read from a recording. `_least_squares` has models,
+# profiles and residuals, and `_plant` has plant and noise as the kernel takes them. `planning` has
+# the bounds of planned experiments, and `running` what is estimated while a loop runs.
 
 from deadtime.estimation._choose import (
     PLANT_COLUMNS as PLANT_COLUMNS,
@@ -49,9 +49,10 @@ from deadtime.estimation.methods._flight_conclusion import unseen_in_words as un
 from deadtime.estimation.methods._frequency import Frequency
 from deadtime.estimation.methods._input_output import GCC, ARXScan
 from deadtime.estimation.methods._method import Method
-from deadtime.estimation.methods._oscillation import Decay, Decrement, Relay
+from deadtime.estimation.methods._oscillation import Decrement, Relay
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._step_response import (
+    Decay,
     Graphical,
     Overshoot,
     OvershootMap as OvershootMap,

@@ -25,9 +25,9 @@ from deadtime.estimation.evidence._rival import beside_rivals
 from deadtime.estimation.methods._frequency import Frequency
 from deadtime.estimation.methods._input_output import GCC, ARXScan
 from deadtime.estimation.methods._method import Loops, Method, Recordings, Run, Windows, paired_runs
-from deadtime.estimation.methods._oscillation import Decay, Decrement, Relay
+from deadtime.estimation.methods._oscillation import Decrement, Relay
 from deadtime.estimation.methods._output_error import OutputError
-from deadtime.estimation.methods._step_response import Graphical, Overshoot
+from deadtime.estimation.methods._step_response import Decay, Graphical, Overshoot
 from deadtime.estimation.methods._waveform import CTA, Grid, Waveform
 from deadtime.loops import Controller
 from deadtime.recordings import Finding, Recording, RecordingCheck

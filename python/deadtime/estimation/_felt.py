@@ -13,7 +13,6 @@ G is that of the continuous plant with its dead time, without a hold, as in `Pla
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from functools import cached_property
 
@@ -93,9 +92,9 @@ class Felt(AtCrossover):
     free: tuple[str, ...]
     cov: Array
 
-    @abstractmethod
     def quantile(self, level: float) -> float:
         """That of Student's distribution that goes with the standard errors at a level."""
+        raise NotImplementedError
 
     @cached_property
     def _limits(self) -> tuple[float, float]:
@@ -196,7 +195,7 @@ class Felt(AtCrossover):
 def _moved(loop: ControlLoop, steps: Mapping[str, float]) -> ControlLoop:
     """The loop with its numbers moved; times stay at zero or above, and the gain keeps its sign."""
     found = {}
-    for name in steps.keys() & loop.parameters.keys():
+    for name in filter(loop.parameters.__contains__, steps):
         value, step = loop.parameters[name], steps[name]
         found[name] = value + step
         if name == "gain":

@@ -72,7 +72,7 @@ class FittedRun(ReadOnlyArrays):
 
 
 def of_runs(runs: tuple[FittedRun, ...]) -> dict[str, Any]:
-    """The fields of a `DelayEstimate` that have the runs."""
+    """The fields of a `DelayEstimate` from its runs: those of the first, and `others`."""
     return {**vars(runs[0]), "others": runs[1:]}
 
 

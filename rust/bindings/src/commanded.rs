@@ -53,7 +53,7 @@ impl CommandedMisfit {
                 plant,
                 is_limited,
                 known: numbers.map(|name| known.get(name).copied().unwrap_or(f64::INFINITY)),
-                places: places(&names, numbers),
+                places: places(&names, numbers)?,
                 start,
             },
         })

@@ -370,7 +370,7 @@ fn named_between(kind: &str) -> PyResult<Between> {
         "straight" | "samples" => Ok(Between::Straight),
         "undecided" => Ok(Between::Undecided),
         _ => Err(PyValueError::new_err(format!(
-            "kind {kind:?}: give 'held', 'straight', 'samples' or 'undecided'"
+            "between {kind:?}: give 'held', 'straight', 'samples' or 'undecided'"
         ))),
     }
 }

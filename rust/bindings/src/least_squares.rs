@@ -13,6 +13,7 @@ use deadtime::{Error, Task};
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
+use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::arrays::{converted, in_order, owned};
@@ -105,11 +106,8 @@ impl ChebyshevMisfit {
                 time: owned(&time)?,
                 output: owned(&output)?,
                 steps,
-                known: ["delay", "gain", "lag", "Kp"].map(|name| match name {
-                    "delay" => 0.0,
-                    _ => known.get(name).copied().unwrap_or(0.0),
-                }),
-                places: places(&names, ["delay", "gain", "lag"]),
+                known: known_beside(&known, &names, ["delay", "gain", "lag", "Kp"])?,
+                places: places(&names, ["delay", "gain", "lag"])?,
                 start,
                 intervals,
                 is_late,
@@ -134,18 +132,44 @@ enum Lines {
 /// Names of the numbers that are fitted, delay, gain and lag by name, and the time between two rows.
 type LineNumbers = (Vec<String>, HashMap<String, f64>, f64);
 
-fn plain((names, known, row): LineNumbers) -> Plain {
+fn plain((names, known, row): LineNumbers) -> PyResult<Plain> {
     let numbers = ["delay", "gain", "lag"];
-    Plain {
-        known: numbers.map(|name| known.get(name).copied().unwrap_or(0.0)),
-        places: places(&names, numbers),
+    Ok(Plain {
+        known: known_beside(&known, &names, numbers)?,
+        places: places(&names, numbers)?,
         row,
-    }
+    })
 }
 
-/// The places of numbers among those that are fitted.
-pub(crate) fn places<const N: usize>(names: &[String], of: [&str; N]) -> [Option<usize>; N] {
-    of.map(|wanted| names.iter().position(|name| name == wanted))
+/// The numbers that are known, zero for those that are fitted.
+fn known_beside<const N: usize>(
+    known: &HashMap<String, f64>,
+    names: &[String],
+    of: [&str; N],
+) -> PyResult<[f64; N]> {
+    let mut out = [0.0; N];
+    for (value, name) in out.iter_mut().zip(of) {
+        *value = match known.get(name) {
+            Some(own) => *own,
+            None if names.iter().any(|fitted| fitted == name) => 0.0,
+            None => return Err(PyKeyError::new_err(name.to_owned())),
+        };
+    }
+    Ok(out)
+}
+
+/// The places of numbers among those that are fitted, which have no others.
+pub(crate) fn places<const N: usize>(
+    names: &[String],
+    of: [&str; N],
+) -> PyResult<[Option<usize>; N]> {
+    match names.iter().find(|name| !of.contains(&name.as_str())) {
+        Some(other) => Err(PyValueError::new_err(format!(
+            "{other:?} cannot be fitted: the numbers are {}",
+            of.join(", ")
+        ))),
+        None => Ok(of.map(|wanted| names.iter().position(|name| name == wanted))),
+    }
 }
 
 #[pymethods]
@@ -161,7 +185,7 @@ impl LinesMisfit {
     ) -> PyResult<Self> {
         Ok(Self {
             inner: Lines::Record(RecordLines {
-                numbers: plain(numbers),
+                numbers: plain(numbers)?,
                 path: HeldPath::new(owned(&commands.0)?, owned(&commands.1)?),
                 time: owned(&time)?,
                 output: owned(&output)?,
@@ -180,7 +204,7 @@ impl LinesMisfit {
         lines: Vec<usize>,
     ) -> PyResult<Self> {
         let (command, output) = (in_order(&command)?, in_order(&output)?);
-        let made = PeriodicLines::new(plain(numbers), &command, &output, samples, &lines);
+        let made = PeriodicLines::new(plain(numbers)?, &command, &output, samples, &lines);
         Ok(Self {
             inner: Lines::Periodic(made),
         })
@@ -353,7 +377,8 @@ fn polynomials_of<'a>(source: &'a Source, calls: &'a Calls<'_>) -> Option<Finder
 impl LeastSquares {
     #[new]
     fn new(parts: Vec<FittedPart<'_>>, weights: Vec<f64>, names: Vec<String>) -> PyResult<Self> {
-        let [delay, lag] = places(&names, ["delay", "lag"]);
+        let [delay, lag] =
+            ["delay", "lag"].map(|wanted| names.iter().position(|name| name == wanted));
         let mut made = Self {
             sources: Vec::new(),
             sizes: Vec::new(),

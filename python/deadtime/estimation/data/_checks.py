@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
+from deadtime._base.validation import is_range
 from deadtime.estimation._native import independent_samples
 from deadtime.loops import ControlLoop, FactoredPlant, Integrator, ParametricPlant, Plant
 from deadtime.recordings import Finding, Recording, no_excitation, no_motion
@@ -231,3 +233,24 @@ def check_ends(names: Sequence[str], point: Array, low: Array, high: Array) -> N
                     "is not a response of this loop to this reference. Check columns, "
                     "signs, units and gains, and choose a window around one step"
                 )
+
+
+def given_recordings(recording: Any) -> list[Any]:
+    """The recordings, of which one may be given alone."""
+    is_several = isinstance(recording, (list, tuple, Iterator))
+    recordings = list(recording) if is_several else [recording]
+    if not recordings:
+        raise ValueError("no recording was given: give a recording, or a list of recordings")
+    return recordings
+
+
+def one_each(name: str, given: Any, number: int) -> list[Any]:
+    """What was given for all recordings, or one each, as a list."""
+    is_window = name == "window" and is_range(given) and len(given) == 2
+    is_several = isinstance(given, (list, tuple)) and not is_window
+    found = list(given) if is_several else [given] * number
+    if len(found) != number:
+        raise ValueError(
+            f"{number} recordings and {len(found)} of `{name}`: give one for all, or one each"
+        )
+    return found

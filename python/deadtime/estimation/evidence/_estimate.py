@@ -91,8 +91,9 @@ TAKEN_AT_REST = "the plant is assumed at rest at the first row, which the record
 #: The kernel's reason where residuals are no noise of a sensor.
 NOT_WHITE = "residuals not white"
 
-#: Reasons that are those of one step, if the command is one.
-FEW_NUMBERS = ("too few told", "classes contradict", "crossover not told")
+#: Reasons that the command told too little; of a single step they are those of the step.
+LITTLE_TOLD = ("too few told", "classes contradict")
+FEW_NUMBERS = (*LITTLE_TOLD, "crossover not told")
 
 
 def reason_of(code: str, found: native.FamilyFit, is_one_step: bool, step: float) -> str:
@@ -198,10 +199,6 @@ def moves_in(fit: FoundPlant) -> bool:
         if bool((command != command[0]).any()):
             return True
     return False
-
-
-def _isnan(values: Any) -> Any:
-    return values != values
 
 
 #: Ratio of the ends of an interval of the gain below which it is shown for a frequency. Larger:
@@ -340,8 +337,7 @@ class PlantEstimate(FoundPlant, Pictured):
 
     def _seen(self) -> list[str]:
         """Gain and equivalent delay at frequencies of the command, where no more is determined."""
-        told = self._code in ("too few told", "classes contradict")
-        if not told or not self.excited.size or self.determined < 2:
+        if self._code not in LITTLE_TOLD or not self.excited.size or self.determined < 2:
             return []
         view = self.at(self.excited)
         each = zip(self.excited.tolist(), view.gain_ci.T, view.delay_ci.T, strict=True)

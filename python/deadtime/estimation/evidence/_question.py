@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal, TypeAlias
@@ -14,32 +14,11 @@ import deadtime.estimation._native as native
 from deadtime._base.arrays import Array
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.validation import OpenRange, is_range, open_interval, positive
+from deadtime._base.validation import OpenRange, open_interval, positive
+from deadtime.estimation.data._checks import given_recordings, one_each
 from deadtime.estimation.data._simulated import commands_by_law, on_its_row, rows_off
 from deadtime.loops import Controller, ControlLoop, Integrator, P
 from deadtime.recordings import Recording
-
-
-def given_recordings(recording: Any) -> list[Any]:
-    """The recordings, of which one may be given alone."""
-    is_several = isinstance(recording, (list, tuple, Iterator))
-    recordings = list(recording) if is_several else [recording]
-    if not recordings:
-        raise ValueError("no recording was given: give a recording, or a list of recordings")
-    return recordings
-
-
-def one_each(name: str, given: Any, number: int) -> list[Any]:
-    """What was given for all recordings, or one each, as a list."""
-    is_window = name == "window" and is_range(given) and len(given) == 2
-    is_several = isinstance(given, (list, tuple)) and not is_window
-    found = list(given) if is_several else [given] * number
-    if len(found) != number:
-        raise ValueError(
-            f"{number} recordings and {len(found)} of `{name}`: give one for all, or one each"
-        )
-    return found
-
 
 #: How the command moves between two rows.
 Between: TypeAlias = Literal["held", "straight", "samples", "undecided"]

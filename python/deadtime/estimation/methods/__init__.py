@@ -1,1 +1,1 @@
-"""The methods of estimation, one file each, and what their results share."""
+"""The methods of estimation, alike ones in one file, and what their results share."""

@@ -6,8 +6,9 @@ F the exact response of 1/(s (lag s + 1)), or of another plant, to the command a
 gain, b the output at the start. For a given delay and lag the best a and b are
 linear least squares (variable projection, Golub & Pereyra 1973).
 
-Rows before a known digital filter are averaged over the time by which the filter is late, in which
-filtered rows are alike, and at least in pairs. The filter and its inverse are those of the kernel.
+Rows before a known digital filter are averaged, at least in pairs. They are averaged over the time
+by which the filter is late, in which filtered rows are alike. The filter and its inverse are those
+of the kernel.
 """
 
 from __future__ import annotations
@@ -94,7 +95,8 @@ class CommandedModel(ModelOfOne):
     def kernel(self) -> native.CommandedMisfit:
         """The misfit of the kernel."""
         plant, data, commands = behind_limits(self.plant), self.recording, self.commands
-        slow = {Integrator: "lag", FirstOrder: "time_constant"}.get(type(plant), "")
+        integrates, rests = isinstance(plant, Integrator), isinstance(plant, FirstOrder)
+        slow = "lag" if integrates else "time_constant" if rests else ""
         numbers = {**plant.parameters, **self.known, "gain": 1.0}
         return native.CommandedMisfit(
             data.time,
@@ -189,7 +191,7 @@ def _fewest(names: tuple[str, ...]) -> int:
 #: Coefficients (b, a) in powers of 1/z.
 GivenFilter: TypeAlias = tuple[Sequence[float], Sequence[float]]
 
-#: Largest difference between two steps of time, as a share of the mean step.
+#: Largest difference between two steps of time in rows of a filter, as a share of the mean step.
 EVEN = 0.5
 
 

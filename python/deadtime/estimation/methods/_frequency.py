@@ -46,7 +46,7 @@ _Asked: TypeAlias = tuple[Recording, tuple[str, ...], float, Mapping[str, float]
 LONGEST = 0.6
 
 #: Why there is no interval for a continuous loop.
-MOVES = (
+NOT_HELD = (
     "the frequency method assumes that the command is constant between samples. The command "
     "of a continuous loop is not. Use method='waveform' for an interval"
 )
@@ -151,7 +151,7 @@ class Frequency(OfOne):
             residuals=residuals,
             verdict=verdict_if(reliable),
             message=_message(names, lines, source, reliable),
-            uncalibrated="" if loop.is_sampled else MOVES,
+            uncalibrated="" if loop.is_sampled else NOT_HELD,
             details={"lines": lines.describe, "command": source, "p_value_of_model": p_value},
             profile=least_squares.Profile(
                 cost=partial(least_squares.least_cost, lines, fit, known),
@@ -260,7 +260,7 @@ def _periodic_lines(
 ) -> _Lines:
     """Lines up to `highest` Hz that the reference of each period, a row each, excites.
 
-    They are over their standard deviations between periods.
+    The misfit of each is divided by its standard deviation between periods.
     """
     data, names, *_ = asked
     repeated, samples = reference.shape

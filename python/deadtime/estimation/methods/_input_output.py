@@ -167,7 +167,7 @@ Weighting = Literal["none", "scot", "phat", "prewhitened"]
 
 #: Significance level of the correlation at one shift. Uncorrelated signals exceed it at the best of
 #: a hundred shifts in one of a hundred recordings.
-LEVEL = 1e-4
+CORRELATION_LEVEL = 1e-4
 
 
 @dataclass(frozen=True)
@@ -219,7 +219,7 @@ class GCC(OfOne):
             {"delay": delay},
             None,
             float(data.output[0]),
-            message=_message(self.weighting, share, feedback, read),
+            message=_gcc_message(self.weighting, share, feedback, read),
             uncalibrated=(
                 "the gcc method reads the peak of a correlation. Its error formulas are valid only "
                 "for stationary noise in open loop"
@@ -241,7 +241,7 @@ def _explained(read: InputOutput, shift: int) -> float:
 
     size = read.command.size - shift
     coefficient, spread = native.correlation_coefficient(read.command, read.response, shift)
-    needed = -float(special.ndtri(LEVEL)) * np.sqrt(max(spread, 0.25) / size)
+    needed = -float(special.ndtri(CORRELATION_LEVEL)) * np.sqrt(max(spread, 0.25) / size)
     if abs(coefficient) < needed:
         raise NotIdentifiableError(
             "the correlation of command and response is at most "
@@ -252,7 +252,7 @@ def _explained(read: InputOutput, shift: int) -> float:
     return abs(coefficient)
 
 
-def _message(weighting: Weighting, share: float, feedback: bool, read: InputOutput) -> str:
+def _gcc_message(weighting: Weighting, share: float, feedback: bool, read: InputOutput) -> str:
     text = (
         f"peak of the cross-correlation (weighting {weighting!r}), "
         f"where command and response have a correlation of {share:.2f}"

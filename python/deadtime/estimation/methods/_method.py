@@ -32,7 +32,6 @@ from deadtime._base.validation import OpenRange, finite, open_interval
 from deadtime._base.verdicts import Verdict, verdict_if
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.evidence._question import given_recordings, one_each
 from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording, RecordingCheck
@@ -67,9 +66,9 @@ class Run(NamedTuple):
 
 def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> list[Run]:
     """Pair recordings with loops and windows; a single loop or window applies to all."""
-    recordings = given_recordings(recording)
-    loops = one_each("loop", loop, len(recordings))
-    windows = one_each("window", window, len(recordings))
+    recordings = checks.given_recordings(recording)
+    loops = checks.one_each("loop", loop, len(recordings))
+    windows = checks.one_each("window", window, len(recordings))
     runs = []
     for index, (record, its_loop, ends) in enumerate(zip(recordings, loops, windows, strict=True)):
         if not isinstance(record, Recording):

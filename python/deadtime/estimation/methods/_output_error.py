@@ -260,7 +260,7 @@ class _Begun:
 def _likeliest(begun: _Begun) -> tuple[native.FlightProfile, tuple[str, ...], list[Run]]:
     """The likeliest plant and noise, doubts about its commands, and the recordings with it.
 
-    With the numbers around them and the commands between rows.
+    Intervals cover the numbers around them, and gaps between commands are filled.
     """
     models, fitted = begun.models, begun.fitted
     fit = begun.whole.beside_noise()

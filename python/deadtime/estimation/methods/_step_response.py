@@ -1,4 +1,4 @@
-"""Delay of an integrator under proportional control, from the overshoot or the beginning of a step.
+"""Delay of an integrator under proportional control, from parts of a step response.
 
 `Overshoot`: the loop is ``z'(t) = K (r − z)(t − Td)`` with ``K = gain·Kp``; everything depends on
 ``x = K·Td`` alone. Three maps from the overshoot Mo to x:
@@ -11,8 +11,7 @@
   exponential ``e(θ) = Σ_j (−x)^j (θ − j + 1)^j / j!`` over ``j ≤ θ + 1`` (method of steps); z
   peaks one delay after the first zero of e.
 * ``saturated``: the loop with its hold and its limit, simulated at the time stamps of the
-recording;
-  no closed form.
+  recording; no closed form.
 
 All maps assume the given gain and no lag, and none corrects for the largest of many noisy samples
 being larger than the peak.
@@ -27,12 +26,24 @@ straight line, because the commands that arrive were computed before it moved:
   found by iteration.
 * ``two_point``: the line through the times at which two shares of the step are reached.
 * ``first_movement``: the first sample from which on the output stays above the noise; later than
-the
-  delay by the time this takes, and by up to a sample.
+  the delay by the time this takes, and by up to a sample.
 
 A limit and a hold do not bend the line. A lag does: part of it counts as delay. Shares beyond K Td
 (or beyond limit Td over the step) are no longer on the line. Only the few samples on the line are
 used, and there is no interval.
+
+`Decay`: the exponential tail of a step response that does not overshoot.
+
+With K Td < 1/e the rightmost root of s (lag s + 1) + K e^(-s Td) = 0 is real, s = -r, and the
+control error decays as e^(-r t). The rate r is fitted to the tail by least squares; then
+
+    Td = ln(r (1 - lag r)/K)/r                    continuous,
+    K = -1/H(e^(-r h); Td)                        sampled every h, H the held plant,
+
+so the gain has to be known: an error of one per cent in it has about the effect of one in 1/r. The
+mode of the next root, also real, decays faster, but near K Td = 1/e hardly so: a later tail
+contains less of it, and less signal. The standard error is that of r by the delta method. The
+method assumes the gain, an output that ends at the reference, and no disturbance.
 """
 
 from __future__ import annotations
@@ -43,11 +54,13 @@ from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
+import deadtime.estimation._native as native
 import deadtime.estimation.data._step_reading as steps
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._native import first_movement, line_through, rise_tangent, x_of_overshoot
+from deadtime._base.validation import positive
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.methods._method import OfOne, Read, Run, check_choice
+from deadtime.loops import ControlLoop
 
 OvershootMap = Literal["dominant", "exact", "saturated"]
 
@@ -100,7 +113,7 @@ def dominant_x(overshoot: float) -> float:
 
 def exact_x(overshoot: float) -> float:
     """``x = K·Td`` of the exact step response with this overshoot, which increases with x."""
-    x = x_of_overshoot(overshoot)
+    x = native.x_of_overshoot(overshoot)
     if x is None:
         raise NotIdentifiableError(
             f"at an overshoot of {100 * overshoot:.3g} %, K·Td is at its limit 1/e = "
@@ -309,7 +322,7 @@ class Graphical(OfOne):
 
 def _first_movement(reading: steps.StepReading) -> int:
     """Row of the first sample from which on the output stays above the noise."""
-    moved = first_movement(reading.travelled, max(steps.CLEARANCE * reading.noise, LEAST))
+    moved = native.first_movement(reading.travelled, max(steps.CLEARANCE * reading.noise, LEAST))
     if moved is None:
         raise NotIdentifiableError(
             f"the output moves within the first sample after the step at {reading.step.time:g} "
@@ -325,14 +338,14 @@ def _two_point(reading: steps.StepReading, low: float, high: float) -> float:
             f"the smaller of `shares`, {low:g}, is too close to the noise, which is "
             f"{reading.noise:.2g} of the step. Give larger `shares`, or a larger step"
         )
-    return line_through(reading.since, reading.travelled, (low, high))
+    return native.line_through(reading.since, reading.travelled, (low, high))
 
 
 def _tangent(reading: steps.StepReading, moved: int, held: float | None) -> tuple[float, float]:
     """Time after the step, s, at which the straight part meets the initial output; its error."""
     # Between the last sample that had not moved and the first that had.
     delay = 0.5 * float(reading.since[moved - 1] + reading.since[moved])
-    found, few = rise_tangent(reading.since, reading.travelled, delay, held, reading.noise)
+    found, few = native.rise_tangent(reading.since, reading.travelled, delay, held, reading.noise)
     if few is not None:
         count, begin, until = few
         raise NotIdentifiableError(
@@ -345,3 +358,111 @@ def _tangent(reading: steps.StepReading, moved: int, held: float | None) -> tupl
             "so noise hides this part. Use method='waveform'"
         )
     return found
+
+
+#: Fewest samples of a tail.
+FEWEST_OF_TAIL = 5
+
+
+@dataclass(frozen=True)
+class Decay(OfOne):
+    """Delay from the exponential tail of a step response that does not overshoot.
+
+    Parameters
+    ----------
+    tail : float
+        The tail begins where this share of the step is left; between 0 and 1.
+
+    Raises
+    ------
+    ValueError
+        When the share is not between 0 and 1.
+    """
+
+    tail: float = 0.3
+
+    name: ClassVar[str] = "decay"
+    limits: ClassVar[str] = (
+        "The method assumes that the gain is known and that the tail is one "
+        "exponential. So a wrong gain, a lag or other modes bias the delay."
+    )
+
+    def __post_init__(self) -> None:
+        if positive("tail", self.tail) >= 1.0:
+            raise ValueError(
+                f"tail={self.tail}: give the share of the step "
+                "that remains where the tail begins, below 1"
+            )
+
+    def read(self, run: Run, names: tuple[str, ...]) -> Read:
+        """Read the numbers from the window of one recording."""
+        loop, simulated = run.loop, run.simulated
+        stiffness = steps.stiffness_of(loop, "decay")
+        reading, extremes = steps.read_decaying_step(simulated.recording, "decay")
+        if extremes:
+            raise NotIdentifiableError(
+                "the output overshoots, so the rightmost roots are complex, and the tail "
+                "is not an exponential. Use method='decrement', 'overshoot' or 'waveform'"
+            )
+        rate, error, samples = _rate(reading, loop, self.tail)
+        lag = loop.parameters["lag"]
+
+        if lag * rate >= 1.0:
+            raise NotIdentifiableError(
+                f"the tail decays at {rate:.4g} 1/s, faster than is possible with "
+                f"a lag of {lag:g} s. So the true lag is smaller: check the lag"
+            )
+        delay, slope = native.delay_of_rate(rate, stiffness, lag, loop.sample_time)
+        stderr = abs(slope) * error
+        if delay < 0.0:
+            raise NotIdentifiableError(
+                f"the tail decays at {rate:.4g} 1/s, slower than without any "
+                f"delay at K = {stiffness:.4g} 1/s. Either the gain is smaller "
+                "than given, or the tail begins too late. Check the gains"
+            )
+        held = 0.5 * (loop.sample_time or 0.0)
+        if rate * (delay + lag + held) >= 1.0:
+            raise NotIdentifiableError(
+                f"the tail decays at {rate:.4g} 1/s, but without overshoot at "
+                f"most e·K = {math.e * stiffness:.4g} 1/s is possible. So K·Td "
+                "is near or above 1/e. Use method='decrement' or 'waveform'"
+            )
+        return Read(
+            {"delay": delay},
+            stderr,
+            reading.start,
+            message=(
+                f"{samples} samples of the tail decay at {rate:.4g} ± {error:.2g} 1/s, assuming "
+                f"a gain of {loop.parameters['gain']:g} and an output that ends at the reference"
+            ),
+            uncalibrated=(
+                "the decay method assumes the given gain and an exponential tail. Noise "
+                f"alone gives the delay a standard error of {stderr:.2g} s. A gain error "
+                f"of 1 % shifts the delay by {0.01 / rate:.2g} s, and other modes in the "
+                "tail also shift the delay. Use method='waveform' for an interval"
+            ),
+            details={"rate": rate, "rate_error": error, "tail_samples": samples},
+        )
+
+
+def _rate(reading: steps.StepReading, loop: ControlLoop, share: float) -> tuple[float, float, int]:
+    """Rate of the tail, where no command was limited, its standard error and number of samples."""
+    most = math.inf
+    if loop.limit is not None:
+        most = loop.limit / (loop.parameters["Kp"] * abs(reading.size))
+    clear = steps.CLEARANCE * reading.noise
+    count, tail = native.step_tail(
+        reading.since, reading.travelled, share, most, clear, FEWEST_OF_TAIL
+    )
+    if tail is None:
+        raise NotIdentifiableError(
+            f"the tail has {count} samples, but the method needs {FEWEST_OF_TAIL}: sample "
+            "faster, record longer, or begin the tail earlier with a larger `tail`"
+        )
+    height, rate, error = tail
+    if height <= 0.0 or rate <= 0.0 or rate < steps.CLEARANCE * error:
+        raise NotIdentifiableError(
+            f"the tail decays at {rate:.3g} ± {error:.2g} 1/s, so the rate may be zero. "
+            "Begin the tail earlier with a larger `tail`, or use method='waveform'"
+        )
+    return rate, error, count

@@ -1,4 +1,4 @@
-"""Least squares of the simulated loop on the whole recording, and over a grid or a polynomial.
+"""Least squares of a loop on the whole recording, from starts, over a grid, or by polynomials.
 
 `Waveform`: least squares from the best of several starts.
 
@@ -75,9 +75,12 @@ PRICE_OF_AIR = 2.0
 #: Where sensor noise goes: into the recording alone, or through the controller as well.
 NoisePath = Literal["auto", "recording", "loop"]
 
-#: Points of the initial grid over the delay, and factors of that over the gain: more points find a
-#: narrow minimum more often and take proportionally longer.
-DELAY_POINTS = 24
+#: Points of the grids over the delay of `Waveform`, and beside zero of `Grid`: more find a narrow
+#: minimum more often and take proportionally longer. Their ends, as shares of the window.
+DELAY_POINTS, GRID_POINTS = 24, 24
+FIRST, SHORTEST, LONGEST = 0.003, 0.005, 0.6
+
+#: Factors of the grid of `Waveform` over the gain.
 GAIN_FACTORS = (0.35, 0.6, 1.0, 1.6)
 
 #: Shortest lag of a sampled loop, as a share of the time between two samples; shorter ones
@@ -195,7 +198,7 @@ class SimulatedModel(least_squares.ModelOfOne):
         shortest = lag = shortest_time(recording)
         if loop.is_sampled:
             shortest, lag = 0.0, self.least_lag * recording.sample_time
-        delays = (np.geomspace(0.003, 0.6, DELAY_POINTS) * span).tolist()
+        delays = (np.geomspace(FIRST, LONGEST, DELAY_POINTS) * span).tolist()
         found = {
             "delay": least_squares.Ends(shortest, span, delays),
             "lag": least_squares.Ends(lag, span, [0.02 * span]),
@@ -219,9 +222,6 @@ def simulated_model(
     checks.check_excitation(simulated.recording, len(names), in_motion=in_motion)
     return SimulatedModel(simulated.recording, names, offset, simulated)
 
-
-#: Points of the grid besides zero, and its ends as shares of the window.
-GRID_POINTS, SHORTEST, LONGEST = 24, 0.005, 0.6
 
 #: Two-sided 95 % quantile of the normal distribution.
 TWO_SIDED_95 = 1.96
@@ -252,7 +252,7 @@ class Grid(OfOne):
 
     def __post_init__(self) -> None:
         if self.delays is not None:
-            object.__setattr__(self, "delays", tuple(_checked(self.delays).tolist()))
+            object.__setattr__(self, "delays", tuple(_checked_delays(self.delays).tolist()))
         base.check_initial_output(self.initial_output)
 
     def names(self, free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
@@ -321,7 +321,7 @@ class Grid(OfOne):
         )
 
 
-def _checked(delays: ArrayLike) -> Array:
+def _checked_delays(delays: ArrayLike) -> Array:
     """The given delays, checked: a minimum has to lie between two of them."""
     grid = increasing("delays", delays)
     if grid.size < 3 or grid[0] < 0.0:
@@ -345,7 +345,7 @@ def _grid_message(names: tuple[str, ...], grid: Array, reliable: bool) -> str:
     return text
 
 
-#: Points of the initial grid of the method with a polynomial over the delay.
+#: Points of the initial grid of `CTA` over the delay; its ends are those of `Grid`.
 CTA_POINTS = 20
 
 #: Most intervals: with more, the corners dominate the error.

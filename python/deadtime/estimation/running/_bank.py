@@ -138,8 +138,8 @@ AT_END = 0.1
 #: White noise so many times the one that was given or fitted is another noise.
 LOUDER = 3.0
 
-#: So many changes within a minute are not those of a delay.
-RESTLESS = 3
+#: So many changes within a minute, in s, are not those of a delay.
+RESTLESS, MINUTE = 3, 60.0
 
 #: Share of the range that an interval must be narrower than, to be an estimate.
 NARROWER = 0.5
@@ -213,6 +213,11 @@ class OnlineEstimate:
         return f"{text}; {self.message}" if self.message else text
 
 
+def is_restless(changes: int) -> bool:
+    """Whether so many changes within a minute are more than a delay has."""
+    return changes >= RESTLESS
+
+
 def estimate_of(
     numbers: BankAnswer,
     white: float,
@@ -238,7 +243,7 @@ def estimate_of(
         against.append(f"the delay may be below the shortest that is tried, {range_[0]:.3g} s")
     if numbers.white > LOUDER * white:
         against.append(f"the noise is {numbers.white / white:.1f} times the expected noise")
-    if changes >= RESTLESS:
+    if is_restless(changes):
         against.append(f"{changes} changes in a minute, so the plant model is incomplete")
     known = numbers.high - numbers.low < NARROWER * (range_[1] - range_[0])
     message = "; ".join(f"not reliable: {reason}" for reason in against)

@@ -32,9 +32,6 @@ LEARN, LAST = 10.0, 30.0
 #: Fewest rows that the noise is learned from.
 FEWEST = 40
 
-#: Changes count for so many seconds.
-MINUTE = 60.0
-
 #: After so many seconds in doubt, a change is one of what the plant lacks. A jump of the delay
 #: itself is found sooner; a longer time reports more changes that are none.
 IN_DOUBT = 2.0
@@ -306,13 +303,12 @@ class OnlineEstimator:
         assert self._noise is not None
         if answer.changed:
             self._changes.append(answer.time)
-        self._changes = [time for time in self._changes if time > answer.time - MINUTE]
+        self._changes = [time for time in self._changes if time > answer.time - bank.MINUTE]
         found = bank.estimate_of(
             answer, self._noise.white, self.delays, self._doubts, changes=len(self._changes)
         )
-        in_doubt = (
-            len(self._changes) >= bank.RESTLESS or found.time - self._doubted_since > IN_DOUBT
-        )
+        late = found.time - self._doubted_since > IN_DOUBT
+        in_doubt = late or bank.is_restless(len(self._changes))
         # The kernel forgets its doubts at a change: they begin again after the next rows.
         if found.verdict == "indication":
             self._doubted_since = min(self._doubted_since, found.time)

@@ -66,9 +66,9 @@ pub use fit::{Fit, Model, Search};
 pub use flight::{
     BetweenRows, Cause, Controlled, Ends, Finding, FlightFit, FlightPlant, FlightProfile,
     FlightRun, FreeNumbers, Judgement, KnownQuantity, LEVEL_OF_TESTS, LONGEST_DELAY, LoopNumbers,
-    MOST_NUMBERS, NoiseInUnits, RunCommands, SHORTEST_LAG, Scatter, Sent, Whiteness, WithNumbers,
-    beside_noise, between_rows, coarse_step, colour_factors, first_numbers, fit_flight,
-    fit_numbers, is_long, judge_profile, least_squares, scatter_of, unseen_lag, whiteness,
+    MOST_NUMBERS, NoiseInUnits, RunCommands, Scatter, Sent, Whiteness, WithNumbers, beside_noise,
+    between_rows, coarse_step, colour_factors, first_numbers, fit_flight, fit_numbers, is_long,
+    judge_profile, least_squares, scatter_of, unseen_lag, whiteness,
 };
 pub use known_filter::{KnownFilter, NoInverse};
 pub use least_squares::{

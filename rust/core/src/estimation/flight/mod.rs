@@ -38,4 +38,4 @@ pub use rounded_rows::coarse_step;
 pub use rounds::{beside_noise, fit_flight};
 pub use search::{Scatter, scatter_of};
 pub use start::{is_long, least_squares};
-pub use tolerances::{LONGEST_DELAY, MOST_NUMBERS, SHORTEST_LAG};
+pub use tolerances::{LONGEST_DELAY, MOST_NUMBERS};

@@ -210,7 +210,7 @@ pub const LONGEST_DELAY: f64 = START.longest;
 pub(super) const LAG_FACTORS: [f64; 3] = START.factors;
 
 /// The shortest lag of a search, in rows.
-pub const SHORTEST_LAG: f64 = SEARCH.shortest;
+pub(super) const SHORTEST_LAG: f64 = SEARCH.shortest;
 
 /// A fitted lag below so many times its lower bound is none: more takes short lags for delay.
 pub(super) const NO_LAG: f64 = 2.0;
