@@ -263,3 +263,63 @@ def test_a_delay_of_zero_has_no_derivative():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.0)
     with pytest.raises(ValueError, match="delay=0"):
         loop.simulate([0.0, 1.0], sensitivities=("delay",))
+
+
+def limited_loops(count):
+    """Loops in continuous time with a limited rate, whose commands turn and leave their bounds."""
+    rng = np.random.default_rng(20261130)
+    for _ in range(count):
+        plant = rng.choice([0, 1])
+        gain, lag = rng.uniform(0.5, 2.0), rng.uniform(0.2, 2.0)
+        yield dtm.ControlLoop(
+            dtm.Integrator(gain) if plant else dtm.FirstOrder(gain, lag),
+            dtm.P(rng.uniform(1.0, 8.0)) if rng.random() < 0.5 else dtm.PI(rng.uniform(1, 5), 0.7),
+            delay=rng.choice([0.05, 0.25, 0.5]),
+            rate_limit=rng.uniform(0.5, 20.0),
+            limit=None if rng.random() < 0.5 else rng.uniform(0.8, 2.0),
+        )
+
+
+@pytest.mark.parametrize("count", [30, pytest.param(300, marks=pytest.mark.survey)])
+def test_limited_rates_that_take_over_at_once_move_with_the_numbers(count):
+    """Against quotients to both sides, where these agree."""
+    time = np.array([0.0, 0.6, 1.1, 1.6, 1.83, 2.0, 3.0])
+    given = {"reference": [1.0, 3.0, -1.0], "reference_time": [0.0, 1.0, 2.0]}
+    compared = 0
+    for loop in limited_loops(count):
+        names = tuple(
+            name for name in ("Kp", "delay", "rate_limit", "limit") if name in loop.parameters
+        )
+        found = loop.simulate(time, sensitivities=names, **given)
+        size = max(1.0, float(np.abs(found.outputs).max()))
+        for name in names:
+            value = loop.parameters[name]
+            sides = [
+                (
+                    loop.replace(**{name: value * (1.0 + step)}).simulate(time, **given).outputs
+                    - found.outputs
+                )
+                / (value * step)
+                for step in (1e-6, -1e-6)
+            ]
+            alike = np.abs(sides[0] - sides[1]) < 1e-3 * size
+            mean = 0.5 * (sides[0] + sides[1])
+            scale = size + np.abs(mean)
+            assert (np.abs(found.sensitivities[name] - mean) < 2e-3 * scale)[alike].all(), (
+                loop,
+                name,
+            )
+            compared += int(alike.sum())
+    assert compared > 10 * count
+
+
+@pytest.mark.parametrize("rate_limit", [0.5, 100.0])
+def test_a_limited_rate_hides_no_break(rate_limit):
+    time = np.linspace(0.0, 12.0, 25)
+    slow = dtm.ControlLoop(
+        dtm.FirstOrder(1.0, 1.0), dtm.PI(1.0, 0.5, weight=0.0), delay=0.1, rate_limit=rate_limit
+    )
+    run = slow.simulate(time, [1.0, 3.0], reference_time=[0.0, 8.0])
+    assert {8.0, 8.1} <= set(run.breaks.round(9))
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.1, rate_limit=rate_limit)
+    assert {8.0, 8.1} <= set(loop.simulate(time, 1.0, load=([8.0], [0.5])).breaks.round(9))

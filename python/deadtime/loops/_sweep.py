@@ -203,9 +203,9 @@ def sweep(
         Return outputs instead of metrics.
     metrics : sequence of str, optional
         Which metrics; by default those of `Response.info`. There are also ``iae``, the integral of
-        the modulus of the control error after the step of the reference, and of the response to a
-        step of a load of one ``load_peak``, ``load_peak_time``, ``load_iae``, ``load_ie`` and
-        ``load_recovery_time``, as in `LoadResponse`.
+        the distance of the output from where it comes to rest, after the step of the reference,
+        and of the response to a step of a load of one ``load_peak``, ``load_peak_time``,
+        ``load_iae``, ``load_ie`` and ``load_recovery_time``, as in `LoadResponse`.
     load_at : {"input", "output"}
         Where the load acts, as in `ControlLoop.load_response`.
     amplitude : float
@@ -247,8 +247,8 @@ def sweep(
     constants are then those of plant and controller. This is evidence, not a proof; `design` proves
     the stability of its result.
 
-    Integrals are those to infinity where no time is given: infinite where an offset remains, NaN
-    where the output does not come to rest. The status is that of the step of the reference if one
+    Integrals are those to infinity where no time is given. Those of a load are infinite where an
+    offset remains. All are NaN where the output does not come to rest. The status is that of the step of the reference if one
     of its metrics of `Response.info` is asked for, otherwise that of the last of the others.
 
     Loops with up to four states are computed with SIMD instructions, several sets at once, if they

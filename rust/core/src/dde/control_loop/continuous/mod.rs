@@ -19,11 +19,13 @@ mod expansion;
 mod field;
 mod impulses;
 mod modes;
+mod motion;
 mod pieces;
 mod polynomial;
 mod run;
 mod saturation;
 mod slopes;
+mod transitions;
 mod values_at_times;
 
 pub(crate) use run::run;

@@ -5,24 +5,22 @@
 //! In all other loops the state moves otherwise while the command is at a bound, or there is no delay.
 //!
 //! In each mode of the command the loop is linear ([`field`](super::field)), and an element ends where a
-//! signal leaves the mode ([`transitions`]). Without a delay and for L < 1, or any L ≠ 1 without bounds,
+//! signal leaves the mode ([`transitions`](super::transitions)). Without a delay and for L < 1, or any L ≠ 1 without bounds,
 //! w = v has one solution.
 
-mod transitions;
-
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start, saturate};
-use crate::dde::control_loop::reference::{Cursor, Reference};
+use crate::dde::control_loop::reference::Reference;
 use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
 use crate::dde::limits::{check_growth, slack};
 use crate::dde::scalar::{Scalar, is_reached};
 use crate::{Error, Task};
 
 use super::effort::watch;
-use super::expansion::Expansion;
-use super::field::{Field, Mode};
+use super::field::Mode;
 use super::impulses::Impulses;
+use super::motion::Run;
 use super::pieces::{Order, Orders, Pieces, REPORTED, SMOOTH};
-use super::saturation::{Side, Stretch, side_of, stretches};
+use super::saturation::{Stretch, side_of, stretches};
 use crate::dde::control_loop::series::Series;
 
 /// Factor on the length of a shortened element.
@@ -62,6 +60,8 @@ pub(super) fn run<S: Scalar>(
         w: Series::constant(S::default()),
         series: [Series::constant(S::default()); 2],
         r: 0.0,
+        last_change: (S::default(), 0.0),
+        begun: None,
         changes: 0,
         orders: Orders::new(plant),
         horizon: 1.0 + 2.0 * requested.last(),
@@ -107,64 +107,17 @@ fn check<S: Scalar>(plant: &LinearLoop<S>) -> Result<(), Error> {
     Ok(())
 }
 
-struct Run<'a, 'r, S: Scalar> {
-    plant: &'a LinearLoop<S>,
-    /// Those of the modes so far, with their expansions.
-    fields: Vec<(Field<S>, Expansion<S>)>,
-    /// The present one.
-    place: usize,
-    /// None without a delay.
-    pieces: Option<Pieces<S>>,
-    /// Are the states the same on both sides of a bound, so that the command alone is cut there?
-    is_cut: bool,
-    /// Of a command that is cut, the side of its bounds, and the intervals of the element.
-    side: Side,
-    stretches: Vec<Stretch>,
-    impulses: Impulses<S>,
-    cursor: Cursor<'a>,
-    z: Vec<S>,
-    /// What acts on z′ besides z and w.
-    forced: Vec<S>,
-    t: S,
-    /// w on the element; zero without a delay.
-    w: Series<S>,
-    /// v and y on the element.
-    series: [Series<S>; 2],
-    r: f64,
-    /// Changes of mode since time went on.
-    changes: u32,
-    orders: Orders,
-    /// An end of time for loops without breaks.
-    horizon: f64,
-    requested: RequestedOutput<'r, S>,
-}
-
 impl<S: Scalar> Run<'_, '_, S> {
-    fn field(&self) -> &Field<S> {
-        &self.fields[self.place].0
-    }
-
-    /// Take up a mode.
-    fn enter(&mut self, mode: Mode) {
-        let known = self.fields.iter().position(|(field, _)| field.mode == mode);
-        self.place = known.unwrap_or_else(|| {
-            let field = Field::new(self.plant, mode, self.pieces.is_some());
-            let expansion = Expansion::new(&field.a, self.z.len());
-            self.fields.push((field, expansion));
-            self.fields.len() - 1
-        });
-    }
-
     /// Advance over one element of time, or to another mode.
     fn element(&mut self, is_first: bool) -> Result<(), Error> {
         let (t, delay) = (self.t, self.plant.delay());
         let tolerance = slack(t, delay);
-        let arriving = self
+        let mut arriving = self
             .pieces
             .as_mut()
             .map_or(SMOOTH, |pieces| pieces.reach(t));
-        let jumps = is_first || is_reached(S::from(self.cursor.next_jump()), t, tolerance);
-        let is_kicked = self.jump(jumps, tolerance);
+        let mut jumps = is_first || is_reached(S::from(self.cursor.next_jump()), t, tolerance);
+        let mut is_kicked = self.jump(jumps, tolerance);
         let stop = self.stop(tolerance);
         let mut h = stop - t;
         let mut next = stop;
@@ -177,6 +130,10 @@ impl<S: Scalar> Run<'_, '_, S> {
         if jumps && !self.is_cut {
             let at_start = self.arrives();
             self.settle(at_start);
+        }
+        if let Some((order, jumped, kicked)) = self.begun.take() {
+            (arriving, jumps, is_kicked) =
+                (arriving.min(order), jumps || jumped, is_kicked || kicked);
         }
         let trial = self.fields[self.place].1.trial;
         if !is_instant && h.value() > trial {
@@ -200,7 +157,8 @@ impl<S: Scalar> Run<'_, '_, S> {
             next = t + S::from(end) * h;
             if next.value() <= t.value() {
                 self.changes += 1;
-                self.leave(change);
+                self.leave_at_once(change);
+                self.begun = Some((arriving, jumps, is_kicked));
                 return Ok(());
             }
         }
@@ -223,6 +181,7 @@ impl<S: Scalar> Run<'_, '_, S> {
         self.emit(h, next, (end, order), is_instant)?;
         self.t = next;
         if let Some(change) = change {
+            self.last_change = (change.later * h, self.slope(h, end));
             self.leave(change);
             self.requested.input_break(next)?;
             if self.pieces.is_none() {
@@ -295,12 +254,6 @@ impl<S: Scalar> Run<'_, '_, S> {
         MARGIN * expansion.expand(&field.a, &field.b, &self.forced, &self.z, &self.w, h)
     }
 
-    /// The values of the bounds.
-    fn bounds(&self) -> Option<(f64, f64)> {
-        let bounds = self.plant.bounds();
-        bounds.map(|(low, high)| (low.value(), high.value()))
-    }
-
     /// Store and pass on what happens on the element, and go to its end.
     fn emit(
         &mut self,
@@ -328,6 +281,7 @@ impl<S: Scalar> Run<'_, '_, S> {
             values.map(|v| saturate(v, bounds))
         });
         let mut scale = h;
+        let last = v.at(S::from(end));
         if is_instant {
             v.set_degree(0);
             scale = S::from(1.0);
@@ -371,10 +325,9 @@ impl<S: Scalar> Run<'_, '_, S> {
         }
         self.fields[self.place].1.end(S::from(end), &mut self.z);
         if self.plant.rate().is_some()
-            && !is_instant
             && let Some(place) = self.z.last_mut()
         {
-            *place = v.at(S::from(end));
+            *place = last;
         }
         check_growth(&self.z, v.coefficients[0], next)
     }

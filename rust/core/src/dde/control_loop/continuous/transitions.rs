@@ -9,28 +9,27 @@
 //! while it runs and lets it back in while it stops, the command stays at the bound: the integral then
 //! follows from that (Filippov 1960).
 
-use crate::dde::control_loop::continuous::field::{Integral, Mode, Signal};
-use crate::dde::control_loop::continuous::saturation::{Side, side_of};
 use crate::dde::control_loop::level_crossings::{in_order, value_at};
 use crate::dde::control_loop::series::Series;
 use crate::dde::scalar::Scalar;
 
-use super::Run;
+use super::field::{Integral, Mode, Signal};
+use super::motion::{NOISE, Run};
+use super::saturation::{Side, side_of};
 
 /// Changes of mode without progress in time after which the mode is kept, because only rounding
 /// errors at a bound cause them.
 const MOST_CHANGES: u32 = 4;
-
-/// Rounding error of a signal, relative to the sum of its parts.
-const NOISE: f64 = 16.0 * f64::EPSILON;
 
 /// Parts of an interval at which a signal is looked at.
 const PROBES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 
 /// A mode that follows, and where on the element.
 #[derive(Clone, Copy)]
-pub(super) struct Change {
+pub(super) struct Change<S> {
     pub(super) at: f64,
+    /// The slope of that, of value zero.
+    pub(super) later: S,
     mode: Mode,
 }
 
@@ -80,35 +79,23 @@ impl<S: Scalar> Run<'_, '_, S> {
         }
     }
 
-    /// A signal on the element.
-    fn series(&self, signal: &Signal<S>) -> Series<S> {
-        let mut out = Series::constant(S::default());
-        let expansion = &self.fields[self.place].1;
-        signal.on(expansion, &self.w, self.r, &mut out);
-        out.trim();
-        out
-    }
-
-    /// Rounding errors of a signal on the element.
-    fn noise(&self, signal: &Signal<S>) -> f64 {
-        let expansion = &self.fields[self.place].1;
-        let w: f64 = self.w.terms().iter().map(|c| c.value().abs()).sum();
-        let forced = signal.constant.value().abs() + (signal.r.value() * self.r).abs();
-        NOISE * (expansion.size(&signal.states) + signal.w.value().abs() * w + forced)
-    }
-
     /// The first change of mode on the element.
-    pub(super) fn change(&self, h: S) -> Option<Change> {
+    pub(super) fn change(&self, h: S) -> Option<Change<S>> {
         if self.is_cut || (self.plant.bounds().is_none() && self.plant.rate().is_none()) {
             return None;
         }
         let mode = self.field().mode;
-        let mut first: Option<Change> = None;
+        let mut first: Option<Change<S>> = None;
         let mut note = |series: &Series<S>, noise: f64, to: Mode| {
             if let Some(at) = self.left(series, noise)
                 && first.is_none_or(|known| at < known.at)
             {
-                first = Some(Change { at, mode: to });
+                let later = later(series, at);
+                first = Some(Change {
+                    at,
+                    later,
+                    mode: to,
+                });
             }
         };
         let field = self.field();
@@ -224,7 +211,7 @@ impl<S: Scalar> Run<'_, '_, S> {
     }
 
     /// Go to another mode, at the end of the element.
-    pub(super) fn leave(&mut self, change: Change) {
+    pub(super) fn leave(&mut self, change: Change<S>) {
         let w = self.w.at(S::from(change.at));
         let mut mode = change.mode;
         let last = self.field().mode;
@@ -232,6 +219,23 @@ impl<S: Scalar> Run<'_, '_, S> {
             mode = self.across(last, mode, w);
         }
         self.enter(mode);
+    }
+
+    /// Go to another mode where the present one has just begun. A limited rate that takes over then does so later or
+    /// earlier as the change before it does, and v has moved by the difference of both rates.
+    pub(super) fn leave_at_once(&mut self, change: Change<S>) {
+        let slew = change.mode.slew;
+        self.leave(change);
+        let (later, before) = self.last_change;
+        if let (true, Some(rate), Some(v)) = (slew != 0, self.plant.rate(), self.z.last_mut()) {
+            *v += later * (S::from(before) - S::from(f64::from(slew)) * rate);
+        }
+    }
+
+    /// The slope of v at a part of the element of length `h`.
+    pub(super) fn slope(&self, h: S, part: f64) -> f64 {
+        let v = self.series(&self.field().v);
+        v.derivative().at(S::from(part)).value() / h.value()
     }
 
     /// The mode at a bound that the command reaches or leaves, of an integral that may stop.
@@ -259,6 +263,17 @@ impl<S: Scalar> Run<'_, '_, S> {
         } else {
             Mode { side: 0, ..mode }
         }
+    }
+}
+
+/// How a zero of a signal moves with the numbers: −ġ/g′, of value zero.
+fn later<S: Scalar>(series: &Series<S>, at: f64) -> S {
+    let slope = series.derivative().at(S::from(at)).value();
+    let moved = series.at(S::from(at)) / S::from(-slope);
+    if slope == 0.0 {
+        S::default()
+    } else {
+        moved.pinned(0.0)
     }
 }
 
