@@ -248,8 +248,9 @@ def sweep(
     the stability of its result.
 
     Integrals are those to infinity where no time is given. Those of a load are infinite where an
-    offset remains. All are NaN where the output does not come to rest. The status is that of the step of the reference if one
-    of its metrics of `Response.info` is asked for, otherwise that of the last of the others.
+    offset remains. All are NaN where the output does not come to rest. The status is that of the
+    step of the reference if one of its metrics of `Response.info` is asked for, otherwise that of
+    the last of the others.
 
     Loops with up to four states are computed with SIMD instructions, several sets at once, if they
     are sampled, or have a delay and a command that does not exceed its limit once it is within it;
