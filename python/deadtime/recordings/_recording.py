@@ -265,7 +265,8 @@ class Recording(ReadOnlyArrays):
         """The recording with commands that follow its own within limits, as in many vehicles.
 
         An estimate from it is that of the linear plant behind the limits, which you need not name.
-        The commands start at rest at the first one, and hold between the times in `sent`.
+        The commands start at rest at the first one, and hold between the times in `sent`
+        (`RateLimited`).
 
         Parameters
         ----------
@@ -286,25 +287,17 @@ class Recording(ReadOnlyArrays):
         ValueError
             If a limit is not above zero.
 
-        See Also
-        --------
-        RateLimited : the same limits in a loop, with the formula.
-
         Examples
         --------
-        A vehicle limits the acceleration to 1 m/s² and the jerk to 5 m/s³:
-
         >>> import numpy as np
         >>> import deadtime as dtm
         >>> t = np.arange(500) * 0.05
         >>> told = 0.8 * np.sign(np.sin(0.9 * t) + np.sin(0.37 * t))
-        >>> limited = dtm.Recording(t, None, np.zeros(500), told).behind_limits(1.0, 5.0)
+        >>> sent = dtm.Recording(t, None, np.zeros(500), told).behind_limits(1.0, 5.0).sent
         >>> plant = dtm.FactoredPlant([0.15], integrator=True).transfer_function() * dtm.delay(0.2)
-        >>> sent = limited.sent
         >>> height = plant.simulate(t, sent.values, input_time=sent.time).outputs
         >>> height = height + 0.002 * np.random.default_rng(1).standard_normal(500)
-        >>> flight = dtm.Recording(t, None, height, told)
-        >>> fit = dtm.estimate_delay(flight.behind_limits(1.0, 5.0))
+        >>> fit = dtm.estimate_delay(dtm.Recording(t, None, height, told).behind_limits(1.0, 5.0))
         >>> fit.verdict, round(fit.delay, 2)
         ('reliable', 0.2)
         """
