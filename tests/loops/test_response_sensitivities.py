@@ -323,3 +323,23 @@ def test_a_limited_rate_hides_no_break(rate_limit):
     assert {8.0, 8.1} <= set(run.breaks.round(9))
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.1, rate_limit=rate_limit)
     assert {8.0, 8.1} <= set(loop.simulate(time, 1.0, load=([8.0], [0.5])).breaks.round(9))
+
+
+@pytest.mark.parametrize("tracking", [0.3, None])
+def test_the_delay_moves_two_jumps_that_meet_apart(tracking):
+    """The reference jumps where the answer to its first jump arrives: one of both derivatives."""
+    time = np.r_[0.0, np.arange(0.013, 1.5, 0.036)]
+    given = {"reference_time": [0.0, 0.25]}
+    windup = {} if tracking is None else {"anti_windup": tracking}
+    for kv, level in ((0.3, 2.0), (0.5, -1.0), (0.6, 0.5)):
+        loop = dtm.ControlLoop(
+            dtm.Integrator(), dtm.PID(1.0, 0.3, kv, derivative_weight=0.0, **windup),
+            delay=0.25, limit=0.6,
+        )  # fmt: skip
+        found = loop.simulate(time, [1.0, level], sensitivities=("delay",), **given)
+        sides = []
+        for step in (1e-8, -1e-8):
+            moved = loop.replace(delay=0.25 + step).simulate(time, [1.0, level], **given)
+            sides.append((moved.outputs - found.outputs) / step)
+        off = [float(np.abs(found.sensitivities["delay"] - side).max()) for side in sides]
+        assert min(off) < 1e-4

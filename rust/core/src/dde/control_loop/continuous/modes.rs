@@ -127,7 +127,7 @@ impl<S: Scalar> Run<'_, '_, S> {
         if is_instant {
             h = h.pinned(0.0);
         }
-        if jumps && !self.is_cut {
+        if (jumps || is_instant) && !self.is_cut {
             let at_start = self.arrives();
             self.settle(at_start);
         }
