@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -92,9 +93,9 @@ class Felt(AtCrossover):
     free: tuple[str, ...]
     cov: Array
 
-    def quantile(self, level: float) -> float:
-        """That of Student's distribution that goes with the standard errors at a level."""
-        raise NotImplementedError
+    if TYPE_CHECKING:
+
+        def quantile(self, level: float) -> float: ...
 
     @cached_property
     def _limits(self) -> tuple[float, float]:
