@@ -127,7 +127,8 @@ impl<S: Scalar> Run<'_, '_, S> {
         if is_instant {
             h = h.pinned(0.0);
         }
-        if (jumps || is_instant) && !self.is_cut {
+        // A limited rate keeps its mode there: only a jump of the reference moves what it follows.
+        if (jumps || (is_instant && self.plant.rate().is_none())) && !self.is_cut {
             let at_start = self.arrives();
             self.settle(at_start);
         }
@@ -180,6 +181,7 @@ impl<S: Scalar> Run<'_, '_, S> {
         }
         self.emit(h, next, (end, order), is_instant)?;
         self.t = next;
+        self.last_change = (S::default(), 0.0);
         if let Some(change) = change {
             self.last_change = (change.later * h, self.slope(h, end));
             self.leave(change);
