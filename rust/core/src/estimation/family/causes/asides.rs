@@ -33,9 +33,10 @@ pub(super) fn columns_from(kind: CauseKind, part: &Part, time: f64) -> Vec<Aside
     vec![Aside::input(sent, vec![0.0, 1.0 / width, 0.0], false), own]
 }
 
-/// The input of a gain that changes or of a drag, as the plant of a minimum moves.
+/// The input of a gain that changes or of a drag, as the plant of a minimum moves. A gain that changes may be that
+/// of the whole command, or of its changes from the first one.
 pub(super) fn moving(
-    kind: CauseKind,
+    (kind, from_first): (CauseKind, bool),
     model: &Model<'_>,
     point: &Point,
     at: usize,
@@ -44,11 +45,8 @@ pub(super) fn moving(
     let (part, place) = (&rows.parts[at], rows.places()[at].clone());
     let delay = model.numbers(&point.x).delay;
     let times: Vec<f64> = part.used.iter().map(|row| part.time[*row]).collect();
-    let full = || {
-        part.sent
-            .iter()
-            .zip(part.command.iter().map(|u| u + part.base))
-    };
+    let base = if from_first { 0.0 } else { part.base };
+    let full = || part.sent.iter().zip(part.command.iter().map(|u| u + base));
     match kind {
         CauseKind::GainRamp => {
             let middle = 0.5 * (part.time[0] + part.time[part.time.len() - 1]);

@@ -25,6 +25,8 @@ pub(super) struct Suspect {
     /// Its size, of causes that the command passes, and the sizes beside it.
     pub(super) size: f64,
     pub(super) between: (f64, f64),
+    /// Is a gain that changes that of the changes from the first command?
+    pub(super) from_first: bool,
     /// The record and the time at which it begins.
     pub(super) record: usize,
     pub(super) time: f64,
@@ -186,6 +188,7 @@ fn suspect(kind: CauseKind, frame: &Frame<'_>, bic: f64) -> Suspect {
         kind,
         size: f64::NAN,
         between: (f64::NAN, f64::NAN),
+        from_first: false,
         record: 0,
         time: f64::NAN,
         bic,
@@ -201,17 +204,9 @@ fn lasting(kind: CauseKind, rows: &Rows, frames: &[Frame<'_>]) -> Vec<Suspect> {
     let tried = sizes(kind, rows);
     for frame in frames {
         if tried.is_empty() {
-            let each = 0..rows.parts.len();
-            let asides: Vec<_> = each
-                .map(|at| moving(kind, &frame.model, &frame.point, at))
-                .collect();
-            if asides.iter().any(Option::is_some) {
-                let (bic, factor) = frame.bic_with(kind, &asides, 1.0);
-                let gain = frame.model.gain(&frame.point);
-                if kind != CauseKind::Drag || factor * gain > 0.0 {
-                    out.push(suspect(kind, frame, bic));
-                }
-            }
+            let from_first = kind.is_of_gain() && rows.parts.iter().any(|part| part.base != 0.0);
+            let both = [false, true].into_iter().take(1 + usize::from(from_first));
+            out.extend(both.filter_map(|from_first| moved(kind, from_first, rows, frame)));
             continue;
         }
         let gain = frame.model.gain(&frame.point);
@@ -233,6 +228,23 @@ fn lasting(kind: CauseKind, rows: &Rows, frames: &[Frame<'_>]) -> Vec<Suspect> {
         }
     }
     out
+}
+
+/// A cause that follows from how the plant moves.
+fn moved(kind: CauseKind, from_first: bool, rows: &Rows, frame: &Frame<'_>) -> Option<Suspect> {
+    let each = 0..rows.parts.len();
+    let asides: Vec<_> = each
+        .map(|at| moving((kind, from_first), &frame.model, &frame.point, at))
+        .collect();
+    if asides.iter().all(Option::is_none) {
+        return None;
+    }
+    let (bic, factor) = frame.bic_with(kind, &asides, 1.0);
+    let gain = frame.model.gain(&frame.point);
+    (kind != CauseKind::Drag || factor * gain > 0.0).then(|| Suspect {
+        from_first,
+        ..suspect(kind, frame, bic)
+    })
 }
 
 /// The likeliest beginning of what begins: on a grid of rows, then between those beside the best.
