@@ -90,11 +90,6 @@ impl CauseKind {
         )
     }
 
-    /// Is it a gain that changes?
-    pub(super) fn is_of_gain(self) -> bool {
-        matches!(self, Self::GainRamp | Self::GainByLevel)
-    }
-
     /// Is its size above zero?
     pub(super) fn is_positive(self) -> bool {
         self.is_passed() || self == Self::Drag

@@ -24,6 +24,9 @@ pub(super) struct Flexible {
     pub(super) seen: Seen,
     /// BIC with one number more, for the size of the error.
     pub(super) bic: f64,
+    /// The noise, and what is searched of plant and noise.
+    pub(super) noise: Noise,
+    pub(super) x: Vec<f64>,
     here: Around,
     deviation: f64,
 }
@@ -47,6 +50,12 @@ struct Place {
 }
 
 impl Flexible {
+    /// The whitened columns of all numbers, and what they leave.
+    pub(super) fn columns(&self) -> (impl Iterator<Item = &Vec<f64>>, &[f64]) {
+        let all = self.here.plant.iter().chain(&self.here.terms);
+        (all, &self.here.left)
+    }
+
     /// The covariance of all numbers, its factor of over-dispersion and the degrees of freedom of that.
     pub(super) fn errors(
         &self,
@@ -241,6 +250,8 @@ fn beside(found: &Minimum<'_>, pole: f64) -> Option<Flexible> {
     let fall = rows * log(before / here.squares) - place.penalty(size.deviation) - size.log_volume;
     Some(Flexible {
         seen: place.seen(model),
+        noise: model.noise,
+        x: place.x,
         bic: found.bic - (fall - log(rows)).max(0.0),
         here,
         deviation: size.deviation,

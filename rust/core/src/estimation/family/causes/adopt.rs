@@ -2,6 +2,7 @@
 
 use super::super::answer::Family;
 use super::super::cause::{Cause, CauseKind};
+use super::super::flexible::flexible;
 use super::super::minima::{Minimum, Plan, minima, seeds_of};
 use super::super::model::Model;
 use super::super::noise::Noise;
@@ -222,8 +223,7 @@ pub(crate) fn with_causes(
         return Ok(own);
     };
     // Plants whose class is in error explain what a cause would.
-    let near = own.minima.iter().map(|one| one.bic);
-    let linear = near.fold(best.bic, f64::min);
+    let linear = least(&own).min(best.bic);
     let mut tried: Vec<(Suspect, Rows, f64)> = Vec::new();
     for mut suspect in suspects(plan.rows, found, task)? {
         let (rows, size) = with_suspect(&mut suspect, plan.rows, task)?;
@@ -249,15 +249,17 @@ pub(crate) fn with_causes(
         let fit = minima(plan, task)?;
         let mut family = answer(&fit)?;
         if let Some(first) = fit.first() {
-            family.causes = causes_of(&own.causes, suspect, *size, first, best.bic - first.bic);
+            let lead = linear - least(&family).min(first.bic);
+            family.causes = causes_of(&own.causes, suspect, *size, first, lead);
         }
         families.push(family);
         fits.push(fit);
     }
     let bic = |at: usize| {
-        fits[at]
+        let own = fits[at]
             .first()
-            .map_or(f64::INFINITY, |one: &Minimum<'_>| one.bic)
+            .map_or(f64::INFINITY, |one: &Minimum<'_>| one.bic);
+        own.min(least(&families[at]))
     };
     let winner = (0..fits.len()).min_by(|a, b| bic(*a).total_cmp(&bic(*b)));
     let goal = linear - CAUSES.adopted.max(CAUSES.beyond * (best.bic - linear));
@@ -303,6 +305,22 @@ pub(crate) fn with_causes(
     Ok(out)
 }
 
+/// BIC of the likeliest plant of an answer, with the error of its class.
+fn least(family: &Family) -> f64 {
+    let all = family.minima.iter().map(|one| one.bic);
+    all.fold(f64::INFINITY, f64::min)
+}
+
+/// BIC of a minimum, with the error of its class where that may be.
+fn with_error(found: &Minimum<'_>) -> f64 {
+    let own = if found.model.rows.flexible {
+        flexible(found)
+    } else {
+        None
+    };
+    own.map_or(found.bic, |own| own.bic.min(found.bic))
+}
+
 /// May a plant with this suspect be as likely as those without it, under its own noise or that of the best one?
 fn is_hopeful(
     suspect: &Suspect,
@@ -320,7 +338,7 @@ fn is_hopeful(
     };
     for (model, x) in [(own, suspect.x.clone()), (other, coloured)] {
         let point = minimum(&model, model.at(x), f64::INFINITY, task)?;
-        if Minimum::new(model, point).bic < linear + CAUSES.hopeful {
+        if with_error(&Minimum::new(model, point)) < linear + CAUSES.hopeful {
             return Ok(true);
         }
     }
@@ -373,7 +391,7 @@ fn is_there(
     };
     let start = model.at(best.point.x.clone());
     let without = Minimum::new(model, minimum(&model, start, f64::INFINITY, task)?);
-    if best.bic > without.bic - CAUSES.adopted {
+    if with_error(best) > with_error(&without) - CAUSES.adopted {
         return Ok(false);
     }
     if !cause.kind.begins() {

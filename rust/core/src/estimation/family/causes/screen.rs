@@ -6,6 +6,7 @@
 use super::super::aside::Aside;
 use super::super::cause::CauseKind;
 use super::super::class::Class;
+use super::super::flexible::flexible;
 use super::super::minima::Minimum;
 use super::super::model::{Model, Point};
 use super::super::noise::Noise;
@@ -65,6 +66,28 @@ impl<'a> Frame<'a> {
             left,
             squares,
         }
+    }
+
+    /// The same of a class with its error, if the record shows one.
+    fn with_error(found: &Minimum<'a>) -> Option<Self> {
+        let own = flexible(found).filter(|own| own.bic < found.bic)?;
+        let model = Model {
+            noise: own.noise,
+            ..found.model
+        };
+        let point = model.at(own.x.clone());
+        let (columns, left) = own.columns();
+        let slopes = Projection::new(columns.cloned());
+        let mut left = left.to_vec();
+        slopes.taken(&mut left);
+        Some(Self {
+            bic: own.bic,
+            squares: dot(&left, &left),
+            model,
+            point,
+            slopes,
+            left,
+        })
     }
 
     /// A column, whitened and beside the numbers of the plant.
@@ -141,6 +164,9 @@ pub(super) fn frames<'a>(found: &[Minimum<'a>]) -> Vec<Frame<'a>> {
             out.push(Frame::new(white, white.at(x)));
         }
     }
+    if best.model.rows.flexible {
+        out.extend(Frame::with_error(best));
+    }
     out
 }
 
@@ -204,9 +230,15 @@ fn lasting(kind: CauseKind, rows: &Rows, frames: &[Frame<'_>]) -> Vec<Suspect> {
     let tried = sizes(kind, rows);
     for frame in frames {
         if tried.is_empty() {
-            let from_first = kind.is_of_gain() && rows.parts.iter().any(|part| part.base != 0.0);
-            let both = [false, true].into_iter().take(1 + usize::from(from_first));
-            out.extend(both.filter_map(|from_first| moved(kind, from_first, rows, frame)));
+            // A gain that depends on the level, times the first command, is a feedback and part of the plant.
+            let is_known = rows.parts.iter().all(|part| part.base == 0.0);
+            let tried: &[bool] = match kind {
+                CauseKind::GainRamp if !is_known => &[false, true],
+                CauseKind::GainByLevel => &[true],
+                _ => &[false],
+            };
+            let all = tried.iter();
+            out.extend(all.filter_map(|from_first| moved(kind, *from_first, rows, frame)));
             continue;
         }
         let gain = frame.model.gain(&frame.point);
