@@ -104,6 +104,12 @@ impl Family {
         Ok(hull(&turning(&minima, task)?, self.largest_delay))
     }
 
+    /// BIC of the likeliest plant, with the error of its class.
+    pub(super) fn least(&self) -> f64 {
+        let all = self.minima.iter().map(|one| one.bic);
+        all.fold(f64::INFINITY, f64::min)
+    }
+
     /// Let the intervals hold those of another answer's plants, up to a BIC.
     pub(super) fn add_within(&mut self, other: &Self, floor: f64) {
         let some = other.minima.iter().filter(|one| one.bic <= floor);

@@ -337,6 +337,9 @@ pub(super) struct Means {
     pub(super) added: [(f64, f64); 4],
     /// The reach of the next search, in multiples of that share.
     pub(super) again: f64,
+    /// BIC by which a mean has to lead, as a share of what the error of a class explains: less takes that error for a
+    /// mean.
+    pub(super) beyond: f64,
     /// Share of a length within which an odd whole number of rows is tried.
     pub(super) whole: f64,
 }
@@ -347,6 +350,7 @@ pub(super) const MEANS: Means = Means {
     lengths: 36,
     added: [(3e-2, 0.02), (1e-3, 2e-3), (1e-5, 2e-4), (1e-7, 2e-5)],
     again: 2.0,
+    beyond: 1.0,
     whole: 0.1,
 };
 

@@ -223,7 +223,7 @@ pub(crate) fn with_causes(
         return Ok(own);
     };
     // Plants whose class is in error explain what a cause would.
-    let linear = least(&own).min(best.bic);
+    let linear = own.least().min(best.bic);
     let mut tried: Vec<(Suspect, Rows, f64)> = Vec::new();
     for mut suspect in suspects(plan.rows, found, task)? {
         let (rows, size) = with_suspect(&mut suspect, plan.rows, task)?;
@@ -249,7 +249,7 @@ pub(crate) fn with_causes(
         let fit = minima(plan, task)?;
         let mut family = answer(&fit)?;
         if let Some(first) = fit.first() {
-            let lead = linear - least(&family).min(first.bic);
+            let lead = linear - family.least().min(first.bic);
             family.causes = causes_of(&own.causes, suspect, *size, first, lead);
         }
         families.push(family);
@@ -259,7 +259,7 @@ pub(crate) fn with_causes(
         let own = fits[at]
             .first()
             .map_or(f64::INFINITY, |one: &Minimum<'_>| one.bic);
-        own.min(least(&families[at]))
+        own.min(families[at].least())
     };
     let winner = (0..fits.len()).min_by(|a, b| bic(*a).total_cmp(&bic(*b)));
     let goal = linear - CAUSES.adopted.max(CAUSES.beyond * (best.bic - linear));
@@ -303,12 +303,6 @@ pub(crate) fn with_causes(
     out.causes.extend(shaken.map(|(cause, _)| cause));
     out.rehull(task)?;
     Ok(out)
-}
-
-/// BIC of the likeliest plant of an answer, with the error of its class.
-fn least(family: &Family) -> f64 {
-    let all = family.minima.iter().map(|one| one.bic);
-    all.fold(f64::INFINITY, f64::min)
 }
 
 /// BIC of a minimum, with the error of its class where that may be.

@@ -51,13 +51,9 @@ pub(crate) fn with_smoothing(
     };
     let fit = minima(&behind, task)?;
     let family = answer(&fit)?;
-    let least = |family: &Family| {
-        let all = family.minima.iter();
-        all.fold(f64::INFINITY, |least, one| least.min(one.bic))
-    };
-    let (without, with) = (least(&own), least(&family));
+    let (without, with) = (own.least(), family.least());
     let best = found.first().map_or(without, |best| best.bic);
-    let is_smoothed = with < without - CAUSES.adopted.max(CAUSES.beyond * (best - without));
+    let is_smoothed = with < without - CAUSES.adopted.max(MEANS.beyond * (best - without));
     let (mut out, other) = if is_smoothed {
         let out = with_causes(family, &behind, &fit, answer, task)?;
         (out, own)
