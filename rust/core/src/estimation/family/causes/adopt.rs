@@ -39,8 +39,7 @@ fn with_suspect(suspect: &mut Suspect, rows: &Rows, task: &Task) -> Result<(Rows
             minimum(&model, model.at(x), f64::INFINITY, task)?
         };
         let each = 0..rows.parts.len();
-        let about = (kind, suspect.from_first);
-        let asides = each.map(|at| moving(about, &model, &point, at).map(|own| vec![own]));
+        let asides = each.map(|at| moving(kind, &model, &point, at).map(|own| vec![own]));
         let asides = asides.collect();
         x = point.x;
         own = rows.with_asides(kind, asides);

@@ -33,10 +33,11 @@ pub(super) fn columns_from(kind: CauseKind, part: &Part, time: f64) -> Vec<Aside
     vec![Aside::input(sent, vec![0.0, 1.0 / width, 0.0], false), own]
 }
 
-/// The input of a gain that changes or of a drag, as the plant of a minimum moves. A gain that changes may be that
-/// of the whole command, or of its changes from the first one.
+/// The input of a gain that changes or of a drag, as the plant of a minimum moves. The gain is that of changes from
+/// the first command: with the level it would feed the output back, which is a part of the plant, and with the time it
+/// would be any drift.
 pub(super) fn moving(
-    (kind, from_first): (CauseKind, bool),
+    kind: CauseKind,
     model: &Model<'_>,
     point: &Point,
     at: usize,
@@ -45,12 +46,11 @@ pub(super) fn moving(
     let (part, place) = (&rows.parts[at], rows.places()[at].clone());
     let delay = model.numbers(&point.x).delay;
     let times: Vec<f64> = part.used.iter().map(|row| part.time[*row]).collect();
-    let base = if from_first { 0.0 } else { part.base };
-    let full = || part.sent.iter().zip(part.command.iter().map(|u| u + base));
+    let changes = || part.sent.iter().zip(&part.command);
     match kind {
         CauseKind::GainRamp => {
             let middle = 0.5 * (part.time[0] + part.time[part.time.len() - 1]);
-            let value = full().map(|(t, u)| u * (t - middle) / part.span);
+            let value = changes().map(|(t, u)| u * (t - middle) / part.span);
             Some(Aside::input(
                 part.sent.clone(),
                 value.collect(),
@@ -68,7 +68,7 @@ pub(super) fn moving(
             }
             let middle = level.iter().sum::<f64>() / level.len() as f64;
             let value =
-                full().map(|(t, u)| u * (between(&times, &level, t + delay) - middle) / range);
+                changes().map(|(t, u)| u * (between(&times, &level, t + delay) - middle) / range);
             Some(Aside::input(
                 part.sent.clone(),
                 value.collect(),

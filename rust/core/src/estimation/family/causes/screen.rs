@@ -26,8 +26,6 @@ pub(super) struct Suspect {
     /// Its size, of causes that the command passes, and the sizes beside it.
     pub(super) size: f64,
     pub(super) between: (f64, f64),
-    /// Is a gain that changes that of the changes from the first command?
-    pub(super) from_first: bool,
     /// The record and the time at which it begins.
     pub(super) record: usize,
     pub(super) time: f64,
@@ -214,7 +212,6 @@ fn suspect(kind: CauseKind, frame: &Frame<'_>, bic: f64) -> Suspect {
         kind,
         size: f64::NAN,
         between: (f64::NAN, f64::NAN),
-        from_first: false,
         record: 0,
         time: f64::NAN,
         bic,
@@ -230,15 +227,7 @@ fn lasting(kind: CauseKind, rows: &Rows, frames: &[Frame<'_>]) -> Vec<Suspect> {
     let tried = sizes(kind, rows);
     for frame in frames {
         if tried.is_empty() {
-            // A gain that depends on the level, times the first command, is a feedback and part of the plant.
-            let is_known = rows.parts.iter().all(|part| part.base == 0.0);
-            let tried: &[bool] = match kind {
-                CauseKind::GainRamp if !is_known => &[false, true],
-                CauseKind::GainByLevel => &[true],
-                _ => &[false],
-            };
-            let all = tried.iter();
-            out.extend(all.filter_map(|from_first| moved(kind, *from_first, rows, frame)));
+            out.extend(moved(kind, rows, frame));
             continue;
         }
         let gain = frame.model.gain(&frame.point);
@@ -263,20 +252,17 @@ fn lasting(kind: CauseKind, rows: &Rows, frames: &[Frame<'_>]) -> Vec<Suspect> {
 }
 
 /// A cause that follows from how the plant moves.
-fn moved(kind: CauseKind, from_first: bool, rows: &Rows, frame: &Frame<'_>) -> Option<Suspect> {
+fn moved(kind: CauseKind, rows: &Rows, frame: &Frame<'_>) -> Option<Suspect> {
     let each = 0..rows.parts.len();
     let asides: Vec<_> = each
-        .map(|at| moving((kind, from_first), &frame.model, &frame.point, at))
+        .map(|at| moving(kind, &frame.model, &frame.point, at))
         .collect();
     if asides.iter().all(Option::is_none) {
         return None;
     }
     let (bic, factor) = frame.bic_with(kind, &asides, 1.0);
     let gain = frame.model.gain(&frame.point);
-    (kind != CauseKind::Drag || factor * gain > 0.0).then(|| Suspect {
-        from_first,
-        ..suspect(kind, frame, bic)
-    })
+    (kind != CauseKind::Drag || factor * gain > 0.0).then(|| suspect(kind, frame, bic))
 }
 
 /// The likeliest beginning of what begins: on a grid of rows, then between those beside the best.
