@@ -38,7 +38,7 @@ class Estimate:
     size : float
         Size of the fault in the units of its cause; NaN without one.
     causes : list
-        Name, size and ends of each cause that the estimate names.
+        Name, size, ends and others, of each cause that the estimate names.
     """
 
     row: str
@@ -163,7 +163,12 @@ def numbers(fit: Any, omega: float, integrators: int) -> dict[str, Any]:
         values["largest gain"] = fit.largest_gain
         ends["largest gain"] = fit.ci(name="largest_gain")
     causes = [
-        {"name": cause.name, "size": float(cause.size), "ends": tuple(map(float, cause.ci))}
+        {
+            "name": cause.name,
+            "size": float(cause.size),
+            "ends": tuple(map(float, cause.ci)),
+            "others": cause.others,
+        }
         for cause in getattr(fit, "causes", ())
     ]
     return {

@@ -56,7 +56,7 @@ def summary(row: Row, found: Sequence[Estimate]) -> dict[str, Any]:
 
 
 def names(row: Row, found: Sequence[Estimate]) -> dict[str, Any]:
-    """Runs that name a cause, those that name the right one, and those whose size is right too."""
+    """Runs that name one cause, the right one, and its size; and those that leave it among others."""
     # A limit that the plant has is no fault.
     own = SLOPES if "acceleration" in row.kind.numbers else set()
     found = [
@@ -64,14 +64,19 @@ def names(row: Row, found: Sequence[Estimate]) -> dict[str, Any]:
         for one in found
     ]
     naming = [one for one in found if one.causes]
-    out = {"named": len(naming), "right": 0, "size right": 0, "false": 0}
+    out = dict.fromkeys(("named", "right", "size right", "either", "false"), 0)
     if row.fault is None or row.fault.name in DISTURBANCES:
         return out | {"false": len(naming)}
     for one in naming:
         cause = one.causes[0]
-        right = cause["name"] in accepted(row)
-        out["right"] += right
-        out["size right"] += right and abs(abs(cause["size"]) - one.size) <= SIZE_ERROR * one.size
+        called, right = {cause["name"], *cause["others"]}, accepted(row)
+        if not (len(called) == 1 or called <= right):
+            out["either"] += bool(called & right)
+            continue
+        out["named"] += 1
+        if called <= right:
+            out["right"] += 1
+            out["size right"] += abs(abs(cause["size"]) - one.size) <= SIZE_ERROR * one.size
     return out
 
 
@@ -107,6 +112,7 @@ COLUMNS: dict[str, list[tuple[str, str, int, int]]] = {
         ("named", "named", 8, 0),
         ("right", "right", 6, 0),
         ("size", "size right", 5, 0),
+        ("either", "either", 7, 0),
         ("false", "false", 6, 0),
     ],
     " ": [("s", "seconds", 6, 1)],

@@ -214,11 +214,14 @@ def test_an_answer_is_counted_as_what_it_is():
     made = replace(found, verdict="reliable", truth=truths, ends=right)
     assert [made.wrong(each) for each in truth.QUANTITIES] == [False, True, False]
     assert not replace(made, verdict="indication").wrong("delay")
-    named = replace(made, causes=[{"name": "stiction", "size": 0.002, "ends": (0.001, 0.003)}])
-    other = replace(made, causes=[{"name": "load", "size": 0.002, "ends": (0.001, 0.003)}])
-    line = table.summary(row, [made, named, other])
+    cause = {"name": "stiction", "size": 0.002, "ends": (0.001, 0.003), "others": ("play",)}
+    named = replace(made, causes=[cause])
+    other = replace(made, causes=[cause | {"name": "load", "others": ()}])
+    open_one = replace(made, causes=[cause | {"others": ("drag", "play")}])
+    line = table.summary(row, [made, named, other, open_one])
     assert (line["named"], line["right"], line["size right"]) == (2, 1, 1)
-    assert (line["runs"], line["reliable"], line["wrong delay"]) == (3, 3, 3)
+    assert line["either"] == 1
+    assert (line["runs"], line["reliable"], line["wrong delay"]) == (4, 4, 4)
     clean = chosen(["height lag: clean"])[0]
     assert table.summary(clean, [made, other])["false"] == 1
     assert json.dumps(table.finite(made.as_plain()), allow_nan=False)

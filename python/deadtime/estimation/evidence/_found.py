@@ -227,7 +227,8 @@ class Cause:
         )
         if not self.others:
             return words
-        return f"{words}; {' or '.join(self.others)} explains the recording about as well"
+        names = " or ".join((self.name, *self.others))
+        return f"{names}, which the recording does not distinguish; the likeliest: {words}"
 
     @property
     def remedy(self) -> str:
