@@ -56,7 +56,7 @@ def summary(row: Row, found: Sequence[Estimate]) -> dict[str, Any]:
 
 
 def names(row: Row, found: Sequence[Estimate]) -> dict[str, Any]:
-    """Runs that name one cause, the right one, and its size; and those that leave it among others."""
+    """Runs that name one cause, the right one, its size; and those that leave it among others."""
     # A limit that the plant has is no fault.
     own = SLOPES if "acceleration" in row.kind.numbers else set()
     found = [
