@@ -14,6 +14,8 @@ pub(super) enum Aside {
     },
     /// The difference of two signals at the input of the plant, times a factor.
     Difference(Signal, Signal, f64),
+    /// The slope over the largest slope of the lag's output, from a change by this share.
+    Slope(f64),
     /// A step of the output from this time on.
     Step(f64),
     /// A delay that is longer by a half after this time, and shorter before it.
@@ -32,9 +34,9 @@ pub(super) struct Signal {
 }
 
 impl Signal {
-    /// What it has more than another one, times a factor.
-    pub(super) fn less(self, other: Self, factor: f64) -> Aside {
-        if self.sent != other.sent || self.straight != other.straight {
+    /// What it has more than another one, times a factor; as one signal where the plant is linear.
+    pub(super) fn less(self, other: Self, factor: f64, is_linear: bool) -> Aside {
+        if !is_linear || self.sent != other.sent || self.straight != other.straight {
             return Aside::Difference(self, other, factor);
         }
         let pairs = self.value.iter().zip(&other.value);

@@ -80,14 +80,13 @@ impl CauseKind {
     pub(super) fn is_passed(self) -> bool {
         matches!(
             self,
-            Self::DeadZone
-                | Self::Play
-                | Self::Stiction
-                | Self::UpperLimit
-                | Self::LowerLimit
-                | Self::RateLimit
-                | Self::SlopeLimit
-        )
+            Self::DeadZone | Self::Play | Self::Stiction | Self::UpperLimit | Self::LowerLimit
+        ) || self.limits_slope()
+    }
+
+    /// Does it limit a slope?
+    pub(super) fn limits_slope(self) -> bool {
+        matches!(self, Self::RateLimit | Self::SlopeLimit)
     }
 
     /// Is its size above zero?

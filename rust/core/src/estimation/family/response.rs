@@ -192,7 +192,24 @@ impl State<'_> {
 pub(super) fn response(rows: &Part, class: Class, numbers: &Numbers) -> Response {
     // A signal behind a delay alone is taken as straight: a held one would jump between rows.
     let straight = rows.straight || class.order == 0 && !class.integrating;
-    response_to(&rows.sent, &rows.command, straight, rows, class, numbers)
+    let (sent, command) = (&rows.sent, &rows.command);
+    match rows.slope {
+        Some(most) => limited(sent, command, most, rows, class, numbers),
+        None => response_to(sent, command, straight, rows, class, numbers),
+    }
+}
+
+/// The same to a command that is held, where the slope of the lag's output is limited.
+fn limited(
+    sent: &[f64],
+    command: &[f64],
+    most: f64,
+    rows: &Part,
+    class: Class,
+    numbers: &Numbers,
+) -> Response {
+    let (sent, command) = rows.behind_slope(sent, command, most, numbers);
+    response_to(&sent, &command, true, rows, class, numbers)
 }
 
 /// The response at the rows to a command of unit area over an interval, zero before and after it.
@@ -261,7 +278,10 @@ impl Signal {
     fn response(&self, part: &Part, class: Class, numbers: &Numbers) -> Response {
         let first = self.value.first().copied().unwrap_or(0.0);
         let value: Vec<f64> = self.value.iter().map(|own| own - first).collect();
-        response_to(&self.sent, &value, self.straight, part, class, numbers)
+        match part.slope {
+            Some(most) => limited(&self.sent, &value, most, part, class, numbers),
+            None => response_to(&self.sent, &value, self.straight, part, class, numbers),
+        }
     }
 }
 
@@ -278,6 +298,16 @@ impl Aside {
                 let mut out = Response::zero(part.used.len());
                 for (signal, factor) in [(one, *factor), (other, -factor)] {
                     out.add(factor, &signal.response(part, class, numbers));
+                }
+                out
+            }
+            Self::Slope(step) => {
+                let mut out = Response::zero(part.used.len());
+                let most = part.slope.unwrap_or(f64::INFINITY);
+                for side in [1.0, -1.0] {
+                    let own = most * (1.0 + side * step);
+                    let own = limited(&part.sent, &part.command, own, part, class, numbers);
+                    out.add(0.5 * side / (step * most), &own);
                 }
                 out
             }

@@ -208,6 +208,8 @@ pub(super) struct Part {
     pub(super) start: Start,
     /// What each cause of the rows adds here.
     pub(super) asides: Vec<Option<Aside>>,
+    /// The largest slope of the output of the plant's lag, in units of the command a second, where one is limited.
+    pub(super) slope: Option<f64>,
     /// The mean that the record is of the output.
     pub(super) smoothing: Option<Smoothing>,
 }
@@ -238,6 +240,7 @@ impl Part {
             rounding: 0.0,
             start,
             asides: Vec::new(),
+            slope: None,
             smoothing: None,
         };
         let count = out.used.len().max(1) as f64;

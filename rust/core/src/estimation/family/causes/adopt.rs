@@ -115,8 +115,7 @@ fn with_size(suspect: &Suspect, rows: &Rows, task: &Task) -> Result<(Rows, f64),
     };
     let mut best = (f64::INFINITY, first);
     for _ in 0..CAUSES.refined {
-        let lag = beside(suspect, rows).numbers(&x).lag();
-        let shape = Shape { kind, size, lag };
+        let shape = Shape { size, ..first };
         let own = rows.behind(shape);
         let model = beside(suspect, &own);
         let point = minimum(&model, model.at(x.clone()), f64::INFINITY, task)?;

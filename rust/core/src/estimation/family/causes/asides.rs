@@ -44,18 +44,22 @@ pub(super) fn moving(
 ) -> Option<Aside> {
     let rows: &Rows = model.rows;
     let (part, place) = (&rows.parts[at], rows.places()[at].clone());
-    let delay = model.numbers(&point.x).delay;
+    let numbers = model.numbers(&point.x);
+    let delay = numbers.delay;
     let times: Vec<f64> = part.used.iter().map(|row| part.time[*row]).collect();
-    let changes = || part.sent.iter().zip(&part.command);
+    let (mut sent, mut command, mut straight) =
+        (part.sent.clone(), part.command.clone(), part.straight);
+    if let Some(most) = part.slope {
+        (sent, command) = part.behind_slope(&sent, &command, most, &numbers);
+        straight = true;
+    }
+    let changes = || sent.iter().zip(&command);
     match kind {
         CauseKind::GainRamp => {
             let middle = 0.5 * (part.time[0] + part.time[part.time.len() - 1]);
             let value = changes().map(|(t, u)| u * (t - middle) / part.span);
-            Some(Aside::input(
-                part.sent.clone(),
-                value.collect(),
-                part.straight,
-            ))
+            let value = value.collect();
+            Some(Aside::input(sent, value, straight))
         }
         CauseKind::GainByLevel => {
             let residual = &point.residual[place];
@@ -69,11 +73,8 @@ pub(super) fn moving(
             let middle = level.iter().sum::<f64>() / level.len() as f64;
             let value =
                 changes().map(|(t, u)| u * (between(&times, &level, t + delay) - middle) / range);
-            Some(Aside::input(
-                part.sent.clone(),
-                value.collect(),
-                part.straight,
-            ))
+            let value = value.collect();
+            Some(Aside::input(sent, value, straight))
         }
         CauseKind::Drag if model.class.integrating => {
             let gain = model.gain(point);

@@ -2,6 +2,7 @@
 
 use super::super::aside::{Aside, Signal};
 use super::super::cause::CauseKind;
+use super::super::class::Numbers;
 use super::super::rows::{Part, Rows};
 use crate::elementary::exp;
 
@@ -37,8 +38,7 @@ impl Shape {
     /// What is behind it of the command of a record.
     fn passed(&self, part: &Part) -> Signal {
         let full = part.full();
-        let is_slope = matches!(self.kind, CauseKind::RateLimit | CauseKind::SlopeLimit);
-        if !is_slope {
+        if !self.kind.limits_slope() {
             return Signal {
                 sent: part.sent.clone(),
                 value: behind(self.kind, self.size, &full),
@@ -151,7 +151,10 @@ pub(super) fn sizes(kind: CauseKind, rows: &Rows) -> Vec<f64> {
         CauseKind::Stiction => even(STUCK, high - low),
         CauseKind::UpperLimit if high > 0.0 => even(LIMITS, high),
         CauseKind::LowerLimit if low < 0.0 => even(LIMITS, -low),
-        CauseKind::RateLimit | CauseKind::SlopeLimit if !rows.straight => {
+        // One of both: behind one, a command is no longer held.
+        CauseKind::RateLimit | CauseKind::SlopeLimit
+            if !rows.straight && !rows.causes.iter().any(|known| known.limits_slope()) =>
+        {
             ratio(SLOPES, (high - low) / rows.row)
         }
         _ => Vec::new(),
@@ -183,8 +186,13 @@ impl Part {
 
     /// With the command behind a cause; its slope over the size stands aside.
     fn behind(&self, shape: Shape) -> Self {
-        let moved = shape.passed(self);
         let mut out = self.clone();
+        if shape.kind == CauseKind::SlopeLimit {
+            out.slope = Some(shape.size);
+            out.asides.push(Some(Aside::Slope(STEP)));
+            return out;
+        }
+        let moved = shape.passed(self);
         let first = moved.value.first().copied().unwrap_or(0.0);
         if shape.kind.remembers() {
             // From where it was at first, until it moves.
@@ -197,12 +205,25 @@ impl Part {
             .push((shape.kind != CauseKind::Stiction).then(|| {
                 let more = shape.of_size(shape.size * (1.0 + STEP)).passed(self);
                 let less = shape.of_size(shape.size * (1.0 - STEP)).passed(self);
-                more.less(less, 0.5 / (STEP * shape.size))
+                more.less(less, 0.5 / (STEP * shape.size), self.slope.is_none())
             }));
         out.base = first;
         out.command = moved.value.iter().map(|u| u - first).collect();
         (out.sent, out.straight) = (moved.sent, moved.straight);
         out
+    }
+
+    /// What a linear plant needs in place of a command that is held, so that it moves as one whose lag has a limited
+    /// slope.
+    pub(in super::super) fn behind_slope(
+        &self,
+        sent: &[f64],
+        command: &[f64],
+        most: f64,
+        numbers: &Numbers,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let points = slow(sent, command, most, numbers.lag(), JUMP * self.row);
+        points.into_iter().unzip()
     }
 }
 
@@ -224,7 +245,7 @@ impl Shape {
             value: part.full(),
             straight: part.straight,
         };
-        self.passed(part).less(full, 1.0)
+        self.passed(part).less(full, 1.0, part.slope.is_none())
     }
 }
 
