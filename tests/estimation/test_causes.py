@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 from typing import Any
 
 import deadtime as dtm
@@ -95,6 +96,53 @@ def test_a_cause_is_named_with_its_size(cause: str, size: float) -> None:
     assert fit.to_dict()["causes"][0]["name"] == cause
     # When an actuator that sticks moves is not known to a row.
     check_the_linear_part(fit, 0.05 if cause == "stiction" else 0.0)
+
+
+def bumped(cause: str, size: float, lags: tuple[float, ...], seed: int = 1) -> dtm.Recording:
+    """Steps of the command around 40, of a process that rests at 60, with a dead time of 10 s."""
+    rng = np.random.default_rng(seed)
+    rows, parts, late = 500, 10, 10
+    command = np.zeros(rows)
+    for row in range(30, rows, 80):
+        command[row:] = rng.choice([-6.0, -3.0, 4.0, 8.0])
+    states, output = [0.0] * len(lags), np.zeros(rows)
+    for row in range(rows):
+        output[row] = states[-1] + 0.1 * rng.standard_normal()
+        sent = command[max(row - late, 0)]
+        for _ in range(parts):
+            gain = 1.8
+            if cause == "gain ramp":
+                gain *= 1.0 + size * (row / rows - 0.5)
+            if cause == "gain by level":
+                gain *= 1.0 + size * states[-1] / 20.0
+            goal = gain * sent
+            for place, lag in enumerate(lags):
+                goal += (states[place] - goal) * math.exp(-1.0 / parts / lag)
+                states[place] = goal
+    return dtm.Recording(np.arange(rows) * 1.0, None, output + 60.0, command + 40.0)
+
+
+@pytest.mark.parametrize("cause", ["gain ramp", "gain by level"])
+@pytest.mark.parametrize("lags", [(40.0, 12.0), (30.0, 20.0, 12.0)])
+def test_a_gain_that_changes_around_an_operating_point_is_named(cause, lags) -> None:
+    """Also of three lags, of which the family has two."""
+    fit = dtm.estimate_delay(bumped(cause, 0.25, lags))
+    first = fit.causes[0]
+    assert (fit.verdict, first.name) == ("reliable", cause)
+    if cause == "gain ramp":
+        assert first.size == pytest.approx(0.25, rel=0.15)
+    # The response at 0.02 rad/s of changes of the command around 40.
+    omega = 0.02
+    gain = 1.8 / math.prod(math.hypot(1.0, omega * lag) for lag in lags)
+    delay = 10.0 + sum(math.atan(omega * lag) for lag in lags) / omega
+    seen = fit.at([omega])
+    assert seen.delay_ci[0, 0] - 0.5 < delay < seen.delay_ci[1, 0] + 0.5
+    assert 0.9 * seen.gain_ci[0, 0] < gain < 1.1 * seen.gain_ci[1, 0]
+
+
+def test_causes_that_the_recording_does_not_distinguish_are_named_together() -> None:
+    cause = replace(dtm.estimate_delay(flown("play", 0.05)).causes[0], others=("drag",))
+    assert cause.in_words().startswith("play or drag, which the recording does not distinguish; ")
 
 
 def test_a_load_is_found_when_it_begins() -> None:
