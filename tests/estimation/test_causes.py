@@ -145,6 +145,42 @@ def test_causes_that_the_recording_does_not_distinguish_are_named_together() -> 
     assert cause.in_words().startswith("play or drag, which the recording does not distinguish; ")
 
 
+def limited(slope: float, dead_zone: float = 0.0, seed: int = 1) -> dtm.Recording:
+    """The vehicle of `flown`, whose acceleration is at most GAIN times `slope`."""
+    rng = np.random.default_rng(seed)
+    parts = 40
+    step = ROW / parts
+    share = 1.0 - math.exp(-step / LAG)
+    queue = deque([0.0] * (round(DELAY / step) + 1), maxlen=round(DELAY / step) + 1)
+    reference = np.zeros(ROWS)
+    for row in range(20, ROWS, 70):
+        reference[row:] = rng.choice([0.0, 0.8, 1.5, -0.7])
+    height = speed = 0.0
+    output, command = np.zeros(ROWS), np.zeros(ROWS)
+    for row in range(ROWS):
+        output[row] = height + 0.003 * rng.standard_normal()
+        command[row] = min(max(1.3 * (reference[row] - output[row]), -1.0), 1.0)
+        for _ in range(parts):
+            queue.append(actuator("dead zone", dead_zone, command[row], 0.0))
+            change = min(max((queue[0] - speed) * share, -slope * step), slope * step)
+            height += GAIN * (speed + 0.5 * change) * step
+            speed += change
+    return dtm.Recording(np.arange(ROWS) * ROW, reference, output, command)
+
+
+def test_a_limit_of_the_slope_is_named_and_a_dead_zone_before_it() -> None:
+    fit = dtm.estimate_delay(limited(0.9))
+    assert [cause.name for cause in fit.causes] == ["slope limit"]
+    assert fit.causes[0].size == pytest.approx(0.9, rel=0.03)
+    check_the_linear_part(fit)
+    both = dtm.estimate_delay(limited(0.9, 0.08))
+    assert {cause.name: round(cause.size, 2) for cause in both.causes} == {
+        "slope limit": pytest.approx(0.9, abs=0.04),
+        "dead zone": pytest.approx(0.08, abs=0.015),
+    }
+    check_the_linear_part(both)
+
+
 def test_a_load_is_found_when_it_begins() -> None:
     (cause, *_) = dtm.estimate_delay(flown("load", -0.06)).causes
     assert cause.time == pytest.approx(231 * ROW, abs=ROW)

@@ -1,7 +1,10 @@
 //! The rows of a record as the family uses them: which count, and where the command is known.
 
-use super::aside::Aside;
+use std::sync::Arc;
+
+use super::aside::{Aside, Signal};
 use super::cause::CauseKind;
+use super::causes::Shape;
 use super::smoothing::Smoothing;
 use super::tolerances::{REST, SEARCH};
 use crate::Error;
@@ -208,6 +211,8 @@ pub(super) struct Part {
     pub(super) start: Start,
     /// What each cause of the rows adds here.
     pub(super) asides: Vec<Option<Aside>>,
+    /// The command before anything that passes it.
+    pub(super) given: Option<Arc<Signal>>,
     /// The largest slope of the output of the plant's lag, in units of the command a second, where one is limited.
     pub(super) slope: Option<f64>,
     /// The mean that the record is of the output.
@@ -240,6 +245,7 @@ impl Part {
             rounding: 0.0,
             start,
             asides: Vec::new(),
+            given: None,
             slope: None,
             smoothing: None,
         };
@@ -320,6 +326,8 @@ pub(super) struct Rows {
     pub(super) in_loop: bool,
     /// What is fitted beside the plant.
     pub(super) causes: Vec<CauseKind>,
+    /// Of each of these, what the command passes.
+    pub(super) shapes: Vec<Option<Shape>>,
     /// May the class be in error?
     pub(super) flexible: bool,
 }
@@ -346,6 +354,7 @@ impl Rows {
             largest_delay,
             in_loop,
             causes: Vec::new(),
+            shapes: Vec::new(),
             flexible: false,
             parts,
         }

@@ -4,7 +4,7 @@ use super::super::answer::Family;
 use super::super::cause::{Cause, CauseKind};
 use super::super::flexible::flexible;
 use super::super::minima::{Minimum, Plan, minima, seeds_of};
-use super::super::model::Model;
+use super::super::model::{Model, Point};
 use super::super::noise::Noise;
 use super::super::rows::Rows;
 use super::super::search::minimum;
@@ -19,11 +19,11 @@ use crate::{Error, Task};
 /// Makes an answer of minima.
 pub(crate) type Answer<'f> = dyn Fn(&[Minimum<'_>]) -> Result<Family, Error> + 'f;
 
-/// The rows with a suspect, and its size where the command passes it.
-fn with_suspect(suspect: &mut Suspect, rows: &Rows, task: &Task) -> Result<(Rows, f64), Error> {
+/// The rows with a suspect.
+fn with_suspect(suspect: &mut Suspect, rows: &Rows, task: &Task) -> Result<Rows, Error> {
     let kind = suspect.kind;
     if kind.begins() {
-        return beginning(suspect, rows, task).map(|rows| (rows, 0.0));
+        return beginning(suspect, rows, task);
     }
     if kind.is_passed() {
         return with_size(suspect, rows, task);
@@ -44,7 +44,7 @@ fn with_suspect(suspect: &mut Suspect, rows: &Rows, task: &Task) -> Result<(Rows
         x = point.x;
         own = rows.with_asides(kind, asides);
     }
-    Ok((own, 0.0))
+    Ok(own)
 }
 
 /// The rows with something that begins, at the likeliest time beside that of the score.
@@ -100,78 +100,98 @@ fn beside<'a>(suspect: &Suspect, rows: &'a Rows) -> Model<'a> {
     }
 }
 
-/// The rows with a suspect of the likeliest size.
-fn with_size(suspect: &Suspect, rows: &Rows, task: &Task) -> Result<(Rows, f64), Error> {
-    let kind = suspect.kind;
-    if kind == CauseKind::Stiction {
-        return sticking(suspect, rows, task);
-    }
-    let mut size = suspect.size;
-    let mut x = suspect.x.clone();
+/// The rows with a suspect of the likeliest size, and those of what the commands pass besides.
+fn with_size(suspect: &Suspect, rows: &Rows, task: &Task) -> Result<Rows, Error> {
     let first = Shape {
-        kind,
-        size,
-        lag: 0.0,
-    };
-    let mut best = (f64::INFINITY, first);
-    for _ in 0..CAUSES.refined {
-        let shape = Shape { size, ..first };
-        let own = rows.behind(shape);
-        let model = beside(suspect, &own);
-        let point = minimum(&model, model.at(x.clone()), f64::INFINITY, task)?;
-        let deviance = model.deviance(&point);
-        if deviance < best.0 {
-            best = (deviance, shape);
-            x.clone_from(&point.x);
-        }
-        let change = point.of_causes().last().copied().unwrap_or(0.0) / model.gain(&point);
-        let (low, high) = suspect.between;
-        let reach = 0.5 * (high - low);
-        let next = (size + change).clamp((size - reach).max(0.5 * size), size + reach);
-        if !next.is_finite() || (next - size).abs() < CAUSES.settled * size {
-            break;
-        }
-        size = next;
-    }
-    Ok((rows.behind(best.1), best.1.size))
-}
-
-/// The same of what sticks, whose likelihood jumps between sizes.
-fn sticking(suspect: &Suspect, rows: &Rows, task: &Task) -> Result<(Rows, f64), Error> {
-    let (low, high) = suspect.between;
-    let mut shape = Shape {
         kind: suspect.kind,
         size: suspect.size,
         lag: 0.0,
     };
-    let mut best = (f64::INFINITY, shape);
+    if first.kind == CauseKind::Stiction {
+        return sticking(suspect, first, rows, task);
+    }
+    let mut own = rows.behind(first);
+    let mut x = suspect.x.clone();
+    let mut best = (f64::INFINITY, own.clone());
+    for _ in 0..CAUSES.refined {
+        let model = beside(suspect, &own);
+        let point = minimum(&model, model.at(x.clone()), f64::INFINITY, task)?;
+        let deviance = model.deviance(&point);
+        let sizes = own.sizes();
+        let mut next = with_changes(&own, &point, model.gain(&point));
+        if deviance < best.0 {
+            best = (deviance, own.clone());
+            x.clone_from(&point.x);
+        }
+        let (low, high) = suspect.between;
+        let reach = 0.5 * (high - low);
+        for (at, (next, size)) in next.iter_mut().zip(&sizes).enumerate() {
+            let most = if at + 1 == sizes.len() {
+                size + reach
+            } else {
+                2.0 * size
+            };
+            let least = if at + 1 == sizes.len() {
+                size - reach
+            } else {
+                0.0
+            };
+            *next = next.clamp(least.max(0.5 * size), most);
+        }
+        let mut pairs = next.iter().zip(&sizes);
+        let is_settled = |(next, size): (&f64, &f64)| (next - size).abs() < CAUSES.settled * size;
+        if next.iter().any(|size| !size.is_finite()) || pairs.all(is_settled) {
+            break;
+        }
+        own = own.with_sizes(&next);
+    }
+    Ok(best.1)
+}
+
+/// The sizes of what the commands pass with the changes that the columns beside them show.
+fn with_changes(rows: &Rows, point: &Point, gain: f64) -> Vec<f64> {
+    let mut end = 0;
+    let mut out = Vec::new();
+    for (kind, shape) in rows.causes.iter().zip(&rows.shapes) {
+        end += kind.columns();
+        if let Some(shape) = shape {
+            let change = point.of_causes()[end - 1] / gain;
+            let changes = *kind != CauseKind::Stiction;
+            out.push(if changes {
+                shape.size + change
+            } else {
+                shape.size
+            });
+        }
+    }
+    out
+}
+
+/// The same of what sticks, whose likelihood jumps between sizes.
+fn sticking(suspect: &Suspect, first: Shape, rows: &Rows, task: &Task) -> Result<Rows, Error> {
+    let (low, high) = suspect.between;
+    let mut best = (f64::INFINITY, rows.behind(first));
     for step in 1..CAUSES.between {
-        shape.size = low + (high - low) * step as f64 / CAUSES.between as f64;
-        let own = rows.behind(shape);
+        let size = low + (high - low) * step as f64 / CAUSES.between as f64;
+        let own = rows.behind(Shape { size, ..first });
         let model = beside(suspect, &own);
         let point = minimum(&model, model.at(suspect.x.clone()), f64::INFINITY, task)?;
         let deviance = model.deviance(&point);
         if deviance < best.0 {
-            best = (deviance, shape);
+            best = (deviance, own);
         }
     }
-    Ok((rows.behind(best.1), best.1.size))
+    Ok(best.1)
 }
 
-/// The causes of a minimum, the last one with the size that the command had passed.
-fn causes_of(
-    known: &[Cause],
-    suspect: &Suspect,
-    size: f64,
-    best: &Minimum<'_>,
-    lead: f64,
-) -> Vec<Cause> {
+/// The causes of a minimum.
+fn causes_of(known: &[Cause], suspect: &Suspect, best: &Minimum<'_>, lead: f64) -> Vec<Cause> {
     let (model, point) = (&best.model, &best.point);
     let gain = model.gain(point);
     let mut out = known.to_vec();
     out.push(Cause {
         kind: suspect.kind,
-        size,
+        size: 0.0,
         error: 0.0,
         time: suspect.time,
         record: suspect.record,
@@ -180,23 +200,20 @@ fn causes_of(
     let (count, mut end) = (out.len(), 0);
     for (at, cause) in out.iter_mut().enumerate() {
         end += cause.kind.columns();
+        let passed = model.rows.shapes[at].map_or(0.0, |shape| shape.size);
         let scale = if cause.kind == CauseKind::OutputStep {
             1.0
         } else {
             gain
         };
         if cause.kind == CauseKind::Stiction {
+            cause.size = passed;
             if at + 1 == count {
                 let step = (suspect.between.1 - suspect.between.0) / CAUSES.between as f64;
                 cause.error = step / 12.0_f64.sqrt();
             }
             continue;
         }
-        let passed = if cause.kind.is_passed() {
-            cause.size
-        } else {
-            0.0
-        };
         cause.size = passed + point.of_causes()[end - 1] / scale;
         cause.error = model.error_of_cause(point, end - 1) / scale.abs();
     }
@@ -222,19 +239,19 @@ pub(crate) fn with_causes(
     };
     // Plants whose class is in error explain what a cause would.
     let linear = own.least().min(best.bic);
-    let mut tried: Vec<(Suspect, Rows, f64)> = Vec::new();
+    let mut tried: Vec<(Suspect, Rows)> = Vec::new();
     for mut suspect in suspects(plan.rows, found, task)? {
-        let (rows, size) = with_suspect(&mut suspect, plan.rows, task)?;
+        let rows = with_suspect(&mut suspect, plan.rows, task)?;
         if is_hopeful(&suspect, &rows, best, linear, task)? {
-            tried.push((suspect, rows, size));
+            tried.push((suspect, rows));
         }
     }
     let seeds = seeds_of(found);
-    let thinned = tried.iter().map(|(_, rows, _)| rows.thinned(STARTS.thin));
+    let thinned = tried.iter().map(|(_, rows)| rows.thinned(STARTS.thin));
     let thin: Vec<Rows> = thinned.collect();
     let pairs = tried.iter().zip(&thin);
     let plans: Vec<Plan<'_>> = pairs
-        .map(|((_, rows, _), thin)| Plan {
+        .map(|((_, rows), thin)| Plan {
             rows,
             thin,
             seeds: &seeds,
@@ -243,12 +260,12 @@ pub(crate) fn with_causes(
         })
         .collect();
     let (mut fits, mut families) = (Vec::new(), Vec::new());
-    for (plan, (suspect, _, size)) in plans.iter().zip(&tried) {
+    for (plan, (suspect, _)) in plans.iter().zip(&tried) {
         let fit = minima(plan, task)?;
         let mut family = answer(&fit)?;
         if let Some(first) = fit.first() {
             let lead = linear - family.least().min(first.bic);
-            family.causes = causes_of(&own.causes, suspect, *size, first, lead);
+            family.causes = causes_of(&own.causes, suspect, first, lead);
         }
         families.push(family);
         fits.push(fit);

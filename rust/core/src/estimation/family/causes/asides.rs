@@ -117,6 +117,7 @@ impl Rows {
             }
         }
         out.causes.push(kind);
+        out.shapes.push(None);
         out
     }
 }

@@ -1,5 +1,7 @@
 //! What reaches the plant of a command, behind an actuator that is not linear.
 
+use std::sync::Arc;
+
 use super::super::aside::{Aside, Signal};
 use super::super::cause::CauseKind;
 use super::super::class::Numbers;
@@ -27,7 +29,7 @@ const STEP: f64 = 0.02;
 
 /// A cause that the command passes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Shape {
+pub(in super::super) struct Shape {
     pub(super) kind: CauseKind,
     pub(super) size: f64,
     /// The lag of the plant, s.
@@ -184,13 +186,45 @@ impl Part {
         self.command.iter().map(|u| u + self.base).collect()
     }
 
-    /// With the command behind a cause; its slope over the size stands aside.
-    fn behind(&self, shape: Shape) -> Self {
+    /// With the command behind all of these; the slopes over their sizes stand aside, in the order of the causes.
+    fn through(&self, causes: &[CauseKind], shapes: &[Option<Shape>]) -> Self {
         let mut out = self.clone();
+        let given = self.given.clone().unwrap_or_else(|| {
+            Arc::new(Signal {
+                sent: self.sent.clone(),
+                value: self.full(),
+                straight: self.straight,
+            })
+        });
+        out.take(Signal::clone(&given));
+        let mut passed = shapes.iter().flatten();
+        let slope = passed.find(|shape| shape.kind == CauseKind::SlopeLimit);
+        out.slope = slope.map(|shape| shape.size);
+        let mut old = self.asides.iter().cloned();
+        out.asides = Vec::new();
+        for (kind, shape) in causes.iter().zip(shapes) {
+            let own: Vec<Option<Aside>> = old.by_ref().take(kind.columns()).collect();
+            match shape {
+                Some(shape) => out.pass(*shape),
+                None => out.asides.extend(own),
+            }
+        }
+        out.given = Some(given);
+        out
+    }
+
+    fn take(&mut self, signal: Signal) {
+        let first = signal.value.first().copied().unwrap_or(0.0);
+        self.base = first;
+        self.command = signal.value.iter().map(|u| u - first).collect();
+        (self.sent, self.straight) = (signal.sent, signal.straight);
+    }
+
+    /// Let the command pass a cause.
+    fn pass(&mut self, shape: Shape) {
         if shape.kind == CauseKind::SlopeLimit {
-            out.slope = Some(shape.size);
-            out.asides.push(Some(Aside::Slope(STEP)));
-            return out;
+            self.asides.push(Some(Aside::Slope(STEP)));
+            return;
         }
         let moved = shape.passed(self);
         let first = moved.value.first().copied().unwrap_or(0.0);
@@ -198,19 +232,16 @@ impl Part {
             // From where it was at first, until it moves.
             let moves = moved.value.iter().map(|u| f64::from(u8::from(*u != first)));
             let began = Aside::input(moved.sent.clone(), moves.collect(), false);
-            out.asides.push(Some(began));
+            self.asides.push(Some(began));
         }
         // What sticks does not move with the size by little and little.
-        out.asides
-            .push((shape.kind != CauseKind::Stiction).then(|| {
-                let more = shape.of_size(shape.size * (1.0 + STEP)).passed(self);
-                let less = shape.of_size(shape.size * (1.0 - STEP)).passed(self);
-                more.less(less, 0.5 / (STEP * shape.size), self.slope.is_none())
-            }));
-        out.base = first;
-        out.command = moved.value.iter().map(|u| u - first).collect();
-        (out.sent, out.straight) = (moved.sent, moved.straight);
-        out
+        let slope = (shape.kind != CauseKind::Stiction).then(|| {
+            let more = shape.of_size(shape.size * (1.0 + STEP)).passed(self);
+            let less = shape.of_size(shape.size * (1.0 - STEP)).passed(self);
+            more.less(less, 0.5 / (STEP * shape.size), self.slope.is_none())
+        });
+        self.asides.push(slope);
+        self.take(moved);
     }
 
     /// What a linear plant needs in place of a command that is held, so that it moves as one whose lag has a limited
@@ -228,12 +259,34 @@ impl Part {
 }
 
 impl Rows {
-    /// With the commands behind a cause.
+    /// With the commands behind one cause more.
     pub(super) fn behind(&self, shape: Shape) -> Self {
         let mut out = self.clone();
-        out.parts = self.parts.iter().map(|part| part.behind(shape)).collect();
         out.causes.push(shape.kind);
-        out
+        out.shapes.push(Some(shape));
+        out.passed_again()
+    }
+
+    /// The sizes of what the commands pass.
+    pub(super) fn sizes(&self) -> Vec<f64> {
+        let shapes = self.shapes.iter().flatten();
+        shapes.map(|shape| shape.size).collect()
+    }
+
+    /// With other sizes of what the commands pass.
+    pub(super) fn with_sizes(&self, sizes: &[f64]) -> Self {
+        let mut out = self.clone();
+        for (shape, size) in out.shapes.iter_mut().flatten().zip(sizes) {
+            shape.size = *size;
+        }
+        out.passed_again()
+    }
+
+    fn passed_again(mut self) -> Self {
+        let (causes, shapes) = (&self.causes, &self.shapes);
+        let parts = self.parts.iter();
+        self.parts = parts.map(|part| part.through(causes, shapes)).collect();
+        self
     }
 }
 

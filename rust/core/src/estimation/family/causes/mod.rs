@@ -17,4 +17,5 @@ mod jitter;
 mod screen;
 mod smoothed;
 
+pub(super) use commands::Shape;
 pub(super) use smoothed::with_smoothing;
