@@ -242,10 +242,14 @@ pub(crate) fn with_causes(
     let mut tried: Vec<(Suspect, Rows)> = Vec::new();
     for mut suspect in suspects(plan.rows, found, task)? {
         let rows = with_suspect(&mut suspect, plan.rows, task)?;
-        if is_hopeful(&suspect, &rows, best, linear, task)? {
-            tried.push((suspect, rows));
-        }
+        suspect.bic = beside_best(&suspect, &rows, best, linear + CAUSES.hopeful, task)?;
+        tried.push((suspect, rows));
     }
+    // As likely as the plants without a cause may be, and not far behind another cause.
+    let bics = tried.iter().map(|(suspect, _)| suspect.bic);
+    let first = bics.fold(f64::INFINITY, f64::min);
+    let most = (linear + CAUSES.hopeful).min(first + EVIDENCE.hopeless);
+    tried.retain(|(suspect, _)| suspect.bic < most);
     let seeds = seeds_of(found);
     let thinned = tried.iter().map(|(_, rows)| rows.thinned(STARTS.thin));
     let thin: Vec<Rows> = thinned.collect();
@@ -330,14 +334,15 @@ fn with_error(found: &Minimum<'_>) -> f64 {
     own.map_or(found.bic, |own| own.bic.min(found.bic))
 }
 
-/// May a plant with this suspect be as likely as those without it, under its own noise or that of the best one?
-fn is_hopeful(
+/// BIC of a plant with this suspect, under its own noise or that of the best one; with the error of its class where it is
+/// above a limit.
+fn beside_best(
     suspect: &Suspect,
     rows: &Rows,
     best: &Minimum<'_>,
-    linear: f64,
+    most: f64,
     task: &Task,
-) -> Result<bool, Error> {
+) -> Result<f64, Error> {
     let own = beside(suspect, rows);
     let mut coloured = suspect.x[..own.plant_numbers()].to_vec();
     coloured.extend_from_slice(&best.point.x[best.model.plant_numbers()..]);
@@ -345,13 +350,19 @@ fn is_hopeful(
         noise: best.model.noise,
         ..own
     };
+    let mut found = Vec::new();
     for (model, x) in [(own, suspect.x.clone()), (other, coloured)] {
         let point = minimum(&model, model.at(x), f64::INFINITY, task)?;
-        if with_error(&Minimum::new(model, point)) < linear + CAUSES.hopeful {
-            return Ok(true);
-        }
+        found.push(Minimum::new(model, point));
     }
-    Ok(false)
+    let least = found
+        .iter()
+        .fold(f64::INFINITY, |least, one| least.min(one.bic));
+    if least < most {
+        return Ok(least);
+    }
+    let all = found.iter().map(with_error);
+    Ok(all.fold(f64::INFINITY, f64::min))
 }
 
 /// Does the last cause move gain or phase at crossover by a part of their intervals? One that does not is in the
