@@ -10,6 +10,7 @@
 //! minimum from one of `starts`, `minima` those of all classes. `candidate` has errors and how many
 //! numbers the input tells, `refine` follows them to more rows, `between` says what rows of a command
 //! leave open, `along_zero` how far a zero may move, `causes` what a linear plant lacks,
+//! `shape` what an actuator makes of a command,
 //! `sensors` which readings are none, `series` the error of a class and `flexible` its search, `hull` intervals over all classes within reach, `verdict` what is claimed.
 
 mod along_zero;
@@ -39,6 +40,7 @@ mod rows;
 mod search;
 mod sensors;
 mod series;
+mod shape;
 mod smoothing;
 mod starts;
 mod tolerances;

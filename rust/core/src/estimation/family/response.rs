@@ -9,6 +9,7 @@
 use super::aside::{Aside, Signal};
 use super::class::{Class, Numbers};
 use super::rows::Part;
+use super::shape::behind_slope;
 use crate::elementary::{exp, sin_cos};
 use crate::linear_algebra::vectors::add_multiple;
 
@@ -208,7 +209,7 @@ fn limited(
     class: Class,
     numbers: &Numbers,
 ) -> Response {
-    let (sent, command) = rows.behind_slope(sent, command, most, numbers);
+    let (sent, command) = behind_slope(sent, command, most, numbers.lag(), rows.row);
     response_to(&sent, &command, true, rows, class, numbers)
 }
 

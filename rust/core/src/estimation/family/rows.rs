@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::aside::{Aside, Signal};
 use super::cause::CauseKind;
-use super::causes::Shape;
+use super::shape::Shape;
 use super::smoothing::Smoothing;
 use super::tolerances::{REST, SEARCH};
 use crate::Error;

@@ -290,7 +290,7 @@ pub(super) const CAUSES: Causes = Causes {
     adopted: 6.0,
     certain: 40.0,
     further: 0.04,
-    beyond: 0.05,
+    beyond: 0.5,
     apart: 0.1,
     again: 0.3,
     between: 8,

@@ -4,6 +4,7 @@ use super::super::aside::Aside;
 use super::super::cause::CauseKind;
 use super::super::model::{Model, Point};
 use super::super::rows::{Part, Rows};
+use super::super::shape::behind_slope;
 
 /// The length of an impulse, in rows.
 const SHORT: f64 = 0.05;
@@ -50,7 +51,7 @@ pub(super) fn moving(
     let (mut sent, mut command, mut straight) =
         (part.sent.clone(), part.command.clone(), part.straight);
     if let Some(most) = part.slope {
-        (sent, command) = part.behind_slope(&sent, &command, most, &numbers);
+        (sent, command) = behind_slope(&sent, &command, most, numbers.lag(), part.row);
         straight = true;
     }
     let changes = || sent.iter().zip(&command);
