@@ -225,10 +225,9 @@ class Cause:
             share=f"{shown(100.0 * self.size, 100.0 * error)} %",
             time="" if self.time is None else f"{self.time:.4g} s",
         )
-        if not self.others:
-            return words
         names = " or ".join((self.name, *self.others))
-        return f"{names}, which the recording does not distinguish; the likeliest: {words}"
+        likeliest = f"{names}, which the recording does not distinguish; the likeliest: {words}"
+        return likeliest if self.others else words
 
     @property
     def remedy(self) -> str:
