@@ -169,11 +169,12 @@ def limited(slope: float, dead_zone: float = 0.0, seed: int = 1) -> dtm.Recordin
 
 
 def test_a_limit_of_the_slope_is_named_and_a_dead_zone_before_it() -> None:
-    fit = dtm.estimate_delay(limited(0.9))
+    known = {"controller": dtm.P(1.3), "limit": 1.0, "between": "held"}
+    fit = dtm.estimate_delay(limited(0.9), **known)
     assert [cause.name for cause in fit.causes] == ["slope limit"]
     assert fit.causes[0].size == pytest.approx(0.9, rel=0.03)
     check_the_linear_part(fit)
-    both = dtm.estimate_delay(limited(0.9, 0.08))
+    both = dtm.estimate_delay(limited(0.9, 0.08), **known)
     assert {cause.name: round(cause.size, 2) for cause in both.causes} == {
         "slope limit": pytest.approx(0.9, abs=0.04),
         "dead zone": pytest.approx(0.08, abs=0.015),
