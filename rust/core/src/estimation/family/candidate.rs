@@ -3,7 +3,7 @@
 use super::along_zero::Along;
 use super::between::{Open, open};
 use super::class::{Class, Numbers};
-use super::dispersion::dispersion;
+use super::dispersion::{dispersion, whiteness};
 use super::flexible::flexible;
 use super::information::{covariance, products};
 use super::loop_view::Seen;
@@ -11,17 +11,13 @@ use super::minima::Minimum;
 use super::model::Point;
 use super::noise::{Coefficients, Noise};
 use super::tolerances::{ALONG, EVIDENCE};
-use crate::estimation::statistics::{chi_squared_beyond, student_reach};
+use crate::estimation::statistics::student_reach;
 use crate::linear_algebra::eigenvalues::eigenvalues;
 use crate::linear_algebra::vectors::dot;
 use crate::{Error, Task};
 
 /// Share by which two sums of the same squares differ at most, as the records are added up.
 const ALIKE: f64 = 1e-9;
-
-/// Lags at which residuals are compared, and rows for each.
-const LAGS: usize = 20;
-const ROWS_A_LAG: usize = 5;
 
 /// One class of plants, fitted.
 #[derive(Debug, Clone)]
@@ -107,6 +103,11 @@ impl Candidate {
         let information = products(&sensitivities, &scales, variance);
         let known = covariance(&information, &scales, 1.0);
         let open = open(model, point, &sensitivities, &known, variance);
+        let white = if is_rounding(point) {
+            1.0
+        } else {
+            whiteness(&point.whitened, model.noise.searched())
+        };
         let mut plain = None;
         let (inner, factor, freedom) = if let Some(own) = flexible {
             plain = Some((seen, known));
@@ -114,7 +115,9 @@ impl Candidate {
             bic = own.bic;
             own.errors(rows.row, free, &places)
         } else {
-            let (factor, freedom) = dispersion(&sensitivities, &point.whitened, variance, &places);
+            let is_white = white >= EVIDENCE.white;
+            let (factor, freedom) =
+                dispersion(&sensitivities, &point.whitened, variance, is_white, &places);
             let rest = factor / explained(&open, &information, &scales);
             if open.share > 0.0 {
                 (
@@ -150,11 +153,7 @@ impl Candidate {
             parameters: model.parameters(),
             told: told(&information, scales.len()),
             limit: found.limit(),
-            white: if is_rounding(point) {
-                1.0
-            } else {
-                whiteness(&point.whitened, model.noise.searched())
-            },
+            white,
             deviation: 0.0,
             innovation: variance.sqrt() / mean_weight,
             residuals: Vec::new(),
@@ -244,6 +243,17 @@ impl Candidate {
     /// Does the record show an error of its class?
     pub(super) const fn errs(&self) -> bool {
         self.seen.series.is_some()
+    }
+
+    /// The residuals as a share of what the model moves.
+    pub(super) fn unexplained(&self) -> f64 {
+        let pairs = self.residuals.iter().zip(&self.fitted);
+        let (mut left, mut moved) = (0.0, 0.0);
+        for (residuals, fitted) in pairs {
+            left += squares_about_mean(residuals);
+            moved += squares_about_mean(fitted);
+        }
+        (left / moved).sqrt()
     }
 
     pub(super) const fn seen(&self) -> Seen {
@@ -359,6 +369,13 @@ fn explained(open: &Open, information: &[f64], scales: &[f64]) -> f64 {
     (1.0 - open.share + trace / n.max(1) as f64).max(1.0)
 }
 
+/// The sum of squares about the mean of the values that are known.
+fn squares_about_mean(values: &[f64]) -> f64 {
+    let known = || values.iter().filter(|value| value.is_finite());
+    let mean = known().sum::<f64>() / known().count().max(1) as f64;
+    known().map(|value| (value - mean).powi(2)).sum()
+}
+
 /// Are the residuals smaller than what is taken for the rounding of the output?
 fn is_rounding(point: &Point) -> bool {
     dot(&point.whitened, &point.whitened) < (1.0 - ALIKE) * point.squares
@@ -370,21 +387,4 @@ fn told(information: &[f64], n: usize) -> usize {
     eigenvalues(information, n).map_or(0, |values| {
         values.iter().filter(|value| value.re > least).count()
     })
-}
-
-/// The probability of correlations as large in white residuals (Ljung & Box 1978).
-fn whiteness(residual: &[f64], searched: usize) -> f64 {
-    let count = residual.len();
-    let lags = LAGS.min(count / ROWS_A_LAG);
-    if lags <= searched {
-        return 1.0;
-    }
-    let square = dot(residual, residual);
-    let mut sum = 0.0;
-    for lag in 1..=lags {
-        let correlation = dot(&residual[lag..], &residual[..count - lag]) / square;
-        sum += correlation * correlation / (count - lag) as f64;
-    }
-    let rows = count as f64;
-    chi_squared_beyond(rows * (rows + 2.0) * sum, (lags - searched) as f64)
 }

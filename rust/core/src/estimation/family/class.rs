@@ -163,6 +163,11 @@ impl Numbers {
         self.delay + self.sum - self.zero
     }
 
+    /// The same without a zero that leads.
+    pub(super) fn latest(&self) -> f64 {
+        self.delay + self.sum - self.zero.min(0.0)
+    }
+
     /// Are the poles a complex pair?
     pub fn are_complex(&self) -> bool {
         self.sum * self.sum < 4.0 * self.product

@@ -13,19 +13,25 @@ use crate::linear_algebra::eigenvalues::eigenvalues;
 use crate::linear_algebra::lu::Lu;
 use crate::linear_algebra::vectors::dot;
 
+/// Lags at which residuals are compared, and rows for each.
+const LAGS: usize = 20;
+const ROWS_A_LAG: usize = 5;
+
 /// The factor of the variance, at least 1, and the degrees of freedom that go with it: of blocks of rows, or of
 /// the records at these places where they differ by more. Records of one plant that differ widen what is known of it.
+/// Where the residuals are not white, the model does not say how much they scatter, and blocks alone do.
 pub(super) fn dispersion(
     sensitivities: &[Vec<f64>],
     residual: &[f64],
     variance: f64,
+    is_white: bool,
     places: &[Range<usize>],
 ) -> (f64, f64) {
     let basis = Projection::new(sensitivities.to_vec()).into_columns();
     let own = blocks(&basis, residual.len());
     let factor = scatter(&basis, residual, &own) / variance;
     let freedom = BLOCKS.freedom * (basis.len() * (own.len() - 1)) as f64;
-    let within = if chi_squared_beyond(factor * freedom, freedom) > BLOCKS.chance {
+    let within = if is_white && chi_squared_beyond(factor * freedom, freedom) > BLOCKS.chance {
         // As the model says, whose own scatter then counts as more blocks would.
         let weight = 1.0 + BLOCKS.prior;
         let own = ((factor + BLOCKS.prior) / weight).max(1.0);
@@ -99,4 +105,21 @@ fn blocks(basis: &[Vec<f64>], rows: usize) -> Vec<Range<usize>> {
     }
     out.push(start..rows);
     out
+}
+
+/// The probability of correlations as large in white residuals (Ljung & Box 1978).
+pub(super) fn whiteness(residual: &[f64], searched: usize) -> f64 {
+    let count = residual.len();
+    let lags = LAGS.min(count / ROWS_A_LAG);
+    if lags <= searched {
+        return 1.0;
+    }
+    let square = dot(residual, residual);
+    let mut sum = 0.0;
+    for lag in 1..=lags {
+        let correlation = dot(&residual[lag..], &residual[..count - lag]) / square;
+        sum += correlation * correlation / (count - lag) as f64;
+    }
+    let rows = count as f64;
+    chi_squared_beyond(rows * (rows + 2.0) * sum, (lags - searched) as f64)
 }

@@ -381,6 +381,13 @@ fn one_kind(
         if rows.flexible {
             out = with_smoothing(out, &plan, &found, &answered, task)?;
         }
+        // Or a plant behind a cause.
+        let is_late = out.candidates.first().and_then(|best| best.limit) == Some("delay");
+        if delay_limit < largest && is_late {
+            delay_limit = largest.min(2.0 * delay_limit);
+            rows = Rows::new(records, starts, delay_limit, straight, question.in_loop);
+            continue;
+        }
         (out.delay_limit, out.weights) = (delay_limit, weights);
         return Ok(out);
     }

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use super::dispersion::dispersion;
+use super::dispersion::{dispersion, whiteness};
 use super::information::{UNKNOWN, covariance, products};
 use super::loop_view::Seen;
 use super::minima::Minimum;
@@ -15,7 +15,7 @@ use super::noise::Noise;
 use super::projection::Projection;
 use super::random::{Size, sizes};
 use super::series::{Series, TERMS};
-use super::tolerances::{SEARCH, SERIES};
+use super::tolerances::{EVIDENCE, SEARCH, SERIES};
 use crate::elementary::{exp, log};
 use crate::linear_algebra::vectors::{add_multiple, dot};
 
@@ -64,7 +64,14 @@ impl Flexible {
         places: &[Range<usize>],
     ) -> (Vec<f64>, f64, f64) {
         let variance = self.here.squares / free;
-        let (factor, freedom) = dispersion(&self.here.plant, &self.here.left, variance, places);
+        let is_white = whiteness(&self.here.left, self.noise.searched()) >= EVIDENCE.white;
+        let (factor, freedom) = dispersion(
+            &self.here.plant,
+            &self.here.left,
+            variance,
+            is_white,
+            places,
+        );
         let (columns, scales) = self.here.columns(&self.seen, row, self.deviation);
         let information = products(&columns, &scales, factor * variance);
         (covariance(&information, &scales, 1.0), factor, freedom)
@@ -206,7 +213,7 @@ fn beside(found: &Minimum<'_>, pole: f64) -> Option<Flexible> {
     let (model, start) = (&found.model, &found.point);
     let rows = model.rows;
     let free = rows.count().saturating_sub(model.parameters()).max(1) as f64;
-    let late = model.numbers(&start.x).low_delay();
+    let late = model.numbers(&start.x).latest();
     let mut place = Place {
         x: start.x.clone(),
         gain: model.gain(start),

@@ -136,6 +136,9 @@ pub(super) struct Evidence {
     pub(super) enough: usize,
     /// Probability below which residuals are not white.
     pub(super) white: f64,
+    /// Residuals that are not white, as a share of what the model moves, above which nothing is claimed: more claims
+    /// intervals for plants that are of another kind.
+    pub(super) unexplained: f64,
     /// Fall of −2 ln L by a delay below zero that shows a command logged late.
     pub(super) shifted: f64,
 }
@@ -152,6 +155,7 @@ pub(super) const EVIDENCE: Evidence = Evidence {
     turn: 0.5,
     enough: 3,
     white: 1e-3,
+    unexplained: 0.3,
     shifted: 10.0,
 };
 
@@ -247,6 +251,9 @@ pub(super) struct Causes {
     /// Steps to the size of a cause, and the change of it, as a share, that ends them.
     pub(super) refined: usize,
     pub(super) settled: f64,
+    /// Factor of a size within which a change of it is taken to first order: more takes what is far from the commands
+    /// that were passed.
+    pub(super) factor: f64,
     /// BIC by which a cause has to lead: less names what is not there.
     pub(super) adopted: f64,
     /// BIC by which it leads where the plant without it is ruled out: more widens intervals.
@@ -287,10 +294,11 @@ pub(super) const CAUSES: Causes = Causes {
     rounds: 1,
     refined: 8,
     settled: 0.002,
+    factor: 2.0,
     adopted: 6.0,
     certain: 40.0,
     further: 0.04,
-    beyond: 0.5,
+    beyond: 1.25,
     apart: 0.1,
     again: 0.3,
     between: 8,

@@ -72,7 +72,8 @@ pub(super) fn verdict(all: &[Turning<'_>], findings: &Findings) -> Verdict {
         };
         return new(Grade::Indication, reason, size);
     }
-    if candidate.white < EVIDENCE.white {
+    // Blocks of rows say how much such residuals scatter, unless they are much of what moves.
+    if candidate.white < EVIDENCE.white && candidate.unexplained() > EVIDENCE.unexplained {
         return new(Grade::Indication, "residuals not white", candidate.white);
     }
     new(Grade::Reliable, "", f64::NAN)

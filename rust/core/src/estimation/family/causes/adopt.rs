@@ -129,14 +129,14 @@ fn with_size(suspect: &Suspect, rows: &Rows, task: &Task) -> Result<Rows, Error>
             let most = if at + 1 == sizes.len() {
                 size + reach
             } else {
-                2.0 * size
+                CAUSES.factor * size
             };
             let least = if at + 1 == sizes.len() {
                 size - reach
             } else {
                 0.0
             };
-            *next = next.clamp(least.max(0.5 * size), most);
+            *next = next.clamp(least.max(size / CAUSES.factor), most);
         }
         let mut pairs = next.iter().zip(&sizes);
         let is_settled = |(next, size): (&f64, &f64)| (next - size).abs() < CAUSES.settled * size;
@@ -220,6 +220,16 @@ fn causes_of(known: &[Cause], suspect: &Suspect, best: &Minimum<'_>, lead: f64) 
     out
 }
 
+/// Is one of these causes far from the size that the commands passed? A change of it is no longer what its column
+/// says.
+fn is_far(causes: &[Cause], rows: &Rows) -> bool {
+    let mut pairs = causes.iter().zip(&rows.shapes);
+    pairs.any(|(cause, shape)| {
+        let factor = shape.map_or(1.0, |shape| cause.size / shape.size);
+        !(1.0 / CAUSES.factor..=CAUSES.factor).contains(&factor)
+    })
+}
+
 /// The answer with what the plant lacks: a cause that is clearly better is adopted, and then a second one is
 /// looked for; those that the record does not rule out widen the intervals.
 pub(crate) fn with_causes(
@@ -263,16 +273,20 @@ pub(crate) fn with_causes(
             ..*plan
         })
         .collect();
-    let (mut fits, mut families) = (Vec::new(), Vec::new());
+    let (mut fits, mut families, mut kept) = (Vec::new(), Vec::new(), Vec::new());
     for (plan, (suspect, _)) in plans.iter().zip(&tried) {
         let fit = minima(plan, task)?;
         let mut family = answer(&fit)?;
         if let Some(first) = fit.first() {
             let lead = linear - family.least().min(first.bic);
             family.causes = causes_of(&own.causes, suspect, first, lead);
+            if is_far(&family.causes, first.model.rows) {
+                continue;
+            }
         }
         families.push(family);
         fits.push(fit);
+        kept.push(plan);
     }
     let bic = |at: usize| {
         let own = fits[at]
@@ -303,7 +317,7 @@ pub(crate) fn with_causes(
             if !matters(&own, &family, task)? {
                 family.causes.pop();
             }
-            let deeper = with_causes(family, &plans[at], &fits[at], answer, task)?;
+            let deeper = with_causes(family, kept[at], &fits[at], answer, task)?;
             (deeper, bic(at) + EVIDENCE.reach)
         }
         None => (own.clone(), linear),
@@ -426,4 +440,40 @@ fn is_there(
         CAUSES.again * (cause.lead + penalty)
     };
     Ok(again < most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::rows::{Record, Start};
+    use super::*;
+
+    #[test]
+    fn a_size_far_from_the_one_that_was_passed_is_none() {
+        let record = Record {
+            time: (0..60).map(f64::from).collect(),
+            output: vec![0.0; 60],
+            command: (0..60).map(|row| f64::from(row / 20 % 2)).collect(),
+            earlier: 0,
+            sent: None,
+            hold: 0.0,
+        };
+        let rows = Rows::new(&[record], &[Start::Held], 5.0, false, false);
+        let rows = rows.behind(Shape {
+            kind: CauseKind::RateLimit,
+            size: 1.2,
+            lag: 0.0,
+        });
+        let of = |size: f64| Cause {
+            kind: CauseKind::RateLimit,
+            size,
+            error: 0.1,
+            time: f64::NAN,
+            record: 0,
+            lead: 80.0,
+        };
+        assert!(!is_far(&[of(1.2)], &rows));
+        assert!(!is_far(&[of(1.0)], &rows));
+        assert!(is_far(&[of(240.0)], &rows));
+        assert!(is_far(&[of(-1.2)], &rows));
+    }
 }
