@@ -7,6 +7,7 @@ was added to the delay; the estimate is not told how much that was.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -68,7 +69,13 @@ def waited(path: Path, number: int, axis: str) -> float:
     after = (told.time >= sent[0]) & (told.time <= sent[-1])
     times, values = told.time[after], 0.01 * told.columns[TOLD[axis]][after]
     first = int(np.argmax(np.abs(values - commands[0]) <= ROUNDED))  # it was told to hover before
-    times, values = times[first:], values[first:]
-    if times.size > sent.size or np.max(np.abs(values - commands[: times.size])) > ROUNDED:
-        raise ValueError(f"flight {number} of {path}: the vehicle was told other commands")
-    return float(np.mean(times - sent[: times.size]))
+    waits: list[float] = []
+    before = math.nan
+    for time, value in zip(times[first:], values[first:], strict=True):
+        place = len(waits)
+        if place < sent.size and abs(value - commands[place]) <= ROUNDED:
+            waits.append(float(time - sent[place]))
+        elif value != before:  # a message may come twice
+            raise ValueError(f"flight {number} of {path}: the vehicle was told other commands")
+        before = value
+    return float(np.mean(waits))
