@@ -3,13 +3,14 @@
 import random
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
 
-from reality import firmware
+from reality import dataflash, firmware
 from reality.dataflash import waited
 from reality.drawn import LONGEST, drawn
 from reality.flights import Flight, Position, clock_of
@@ -43,6 +44,25 @@ def test_waits_are_drawn_between_flights_without():
     assert len(set(waits[1:-1])) == 3
     assert all(0.0 <= wait <= LONGEST for wait in waits)
     assert drawn(3, 6, ("height",), ("calm",)) != flights
+
+
+def test_a_command_that_is_logged_twice_is_one(monkeypatch):
+    sent, values = np.arange(6.0), np.array([0.1, 0.2, 0.2, 0.4, 0.5, 0.6])
+    at = np.array([0.0, 1.0, 2.0, 3.0, 3.9, 4.0, 5.0]) + 0.25
+    marks = {"Cmd": np.full(6, dataflash.MARK), "P3": np.full(6, 2), "P1": values, "P2": values}
+
+    def log(told):
+        topics = {
+            "MAVC": SimpleNamespace(time=sent, columns=marks),
+            "GUIP": SimpleNamespace(time=at, columns={"vZ": 100.0 * np.array(told)}),
+        }
+        return lambda path: SimpleNamespace(contents=SimpleNamespace(topics=topics))
+
+    monkeypatch.setattr(dataflash.dtm, "open_log", log([0.1, 0.2, 0.2, 0.4, 0.4, 0.5, 0.6]))
+    assert waited(Path("log.bin"), 2, "height") == pytest.approx(0.25)
+    monkeypatch.setattr(dataflash.dtm, "open_log", log([0.1, 0.2, 0.2, 0.4, 0.3, 0.5, 0.6]))
+    with pytest.raises(ValueError, match="the vehicle was told other commands"):
+        waited(Path("log.bin"), 2, "height")
 
 
 @pytest.mark.survey
