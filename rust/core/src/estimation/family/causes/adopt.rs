@@ -2,187 +2,22 @@
 
 use super::super::answer::Family;
 use super::super::cause::{Cause, CauseKind};
+use super::super::class::{Class, Numbers};
 use super::super::flexible::flexible;
 use super::super::minima::{Minimum, Plan, minima, seeds_of};
-use super::super::model::{Model, Point};
+use super::super::model::Model;
 use super::super::noise::Noise;
 use super::super::rows::Rows;
 use super::super::search::minimum;
-use super::super::shape::Shape;
 use super::super::tolerances::{CAUSES, EVIDENCE, STARTS};
-use super::asides::{columns_from, moving};
 use super::jitter::jitter;
 use super::screen::{Suspect, begins_again, suspects};
+use super::suspected::{beside, nearer, with_suspect};
 use crate::elementary::log;
 use crate::{Error, Task};
 
 /// Makes an answer of minima.
 pub(crate) type Answer<'f> = dyn Fn(&[Minimum<'_>]) -> Result<Family, Error> + 'f;
-
-/// The rows with a suspect.
-fn with_suspect(suspect: &mut Suspect, rows: &Rows, task: &Task) -> Result<Rows, Error> {
-    let kind = suspect.kind;
-    if kind.begins() {
-        return beginning(suspect, rows, task);
-    }
-    if kind.is_passed() {
-        return with_size(suspect, rows, task);
-    }
-    // As the plant moves without it, and then as it moves with it.
-    let mut own = rows.clone();
-    let mut x = suspect.x.clone();
-    for round in 0..=CAUSES.rounds {
-        let model = beside(suspect, &own);
-        let point = if round == 0 {
-            model.at(x)
-        } else {
-            minimum(&model, model.at(x), f64::INFINITY, task)?
-        };
-        let each = 0..rows.parts.len();
-        let asides = each.map(|at| moving(kind, &model, &point, at).map(|own| vec![own]));
-        let asides = asides.collect();
-        x = point.x;
-        own = rows.with_asides(kind, asides);
-    }
-    Ok(own)
-}
-
-/// The rows with something that begins, at the likeliest time beside that of the score.
-fn beginning(suspect: &mut Suspect, rows: &Rows, task: &Task) -> Result<Rows, Error> {
-    let with = |time: f64| {
-        let mut asides = vec![None; rows.parts.len()];
-        let part = &rows.parts[suspect.record];
-        asides[suspect.record] = Some(columns_from(suspect.kind, part, time));
-        rows.with_asides(suspect.kind, asides)
-    };
-    let mut x = suspect.x.clone();
-    let mut best = (f64::INFINITY, suspect.time, 0.0);
-    let mut time = suspect.time;
-    if suspect.kind == CauseKind::Load {
-        for _ in 0..CAUSES.refined {
-            let own = with(time);
-            let model = beside(suspect, &own);
-            let point = minimum(&model, model.at(x.clone()), f64::INFINITY, task)?;
-            let deviance = model.deviance(&point);
-            let later = match point.of_causes() {
-                [.., slope, size] => -slope / size,
-                _ => 0.0,
-            };
-            if deviance < best.0 {
-                best = (deviance, time, later);
-                x = point.x;
-            } else {
-                // Too far.
-                best.2 *= 0.5;
-            }
-            let step = best.2.clamp(-suspect.between.1, suspect.between.1);
-            if !step.is_finite() || step.abs() < CAUSES.near * rows.parts[suspect.record].row {
-                break;
-            }
-            time = best.1 + step;
-        }
-        time = best.1;
-    }
-    let out = with(time);
-    suspect.time = time;
-    Ok(out)
-}
-
-/// The plant beside which a suspect is likeliest.
-fn beside<'a>(suspect: &Suspect, rows: &'a Rows) -> Model<'a> {
-    Model {
-        rows,
-        class: suspect.class,
-        noise: suspect.noise,
-        responds: true,
-        zero: None,
-        level: true,
-    }
-}
-
-/// The rows with a suspect of the likeliest size, and those of what the commands pass besides.
-fn with_size(suspect: &Suspect, rows: &Rows, task: &Task) -> Result<Rows, Error> {
-    let first = Shape {
-        kind: suspect.kind,
-        size: suspect.size,
-        lag: 0.0,
-    };
-    if first.kind == CauseKind::Stiction {
-        return sticking(suspect, first, rows, task);
-    }
-    let mut own = rows.behind(first);
-    let mut x = suspect.x.clone();
-    let mut best = (f64::INFINITY, own.clone());
-    for _ in 0..CAUSES.refined {
-        let model = beside(suspect, &own);
-        let point = minimum(&model, model.at(x.clone()), f64::INFINITY, task)?;
-        let deviance = model.deviance(&point);
-        let sizes = own.sizes();
-        let mut next = with_changes(&own, &point, model.gain(&point));
-        if deviance < best.0 {
-            best = (deviance, own.clone());
-            x.clone_from(&point.x);
-        }
-        let (low, high) = suspect.between;
-        let reach = 0.5 * (high - low);
-        for (at, (next, size)) in next.iter_mut().zip(&sizes).enumerate() {
-            let most = if at + 1 == sizes.len() {
-                size + reach
-            } else {
-                CAUSES.factor * size
-            };
-            let least = if at + 1 == sizes.len() {
-                size - reach
-            } else {
-                0.0
-            };
-            *next = next.clamp(least.max(size / CAUSES.factor), most);
-        }
-        let mut pairs = next.iter().zip(&sizes);
-        let is_settled = |(next, size): (&f64, &f64)| (next - size).abs() < CAUSES.settled * size;
-        if next.iter().any(|size| !size.is_finite()) || pairs.all(is_settled) {
-            break;
-        }
-        own = own.with_sizes(&next);
-    }
-    Ok(best.1)
-}
-
-/// The sizes of what the commands pass with the changes that the columns beside them show.
-fn with_changes(rows: &Rows, point: &Point, gain: f64) -> Vec<f64> {
-    let mut end = 0;
-    let mut out = Vec::new();
-    for (kind, shape) in rows.causes.iter().zip(&rows.shapes) {
-        end += kind.columns();
-        if let Some(shape) = shape {
-            let change = point.of_causes()[end - 1] / gain;
-            let changes = *kind != CauseKind::Stiction;
-            out.push(if changes {
-                shape.size + change
-            } else {
-                shape.size
-            });
-        }
-    }
-    out
-}
-
-/// The same of what sticks, whose likelihood jumps between sizes.
-fn sticking(suspect: &Suspect, first: Shape, rows: &Rows, task: &Task) -> Result<Rows, Error> {
-    let (low, high) = suspect.between;
-    let mut best = (f64::INFINITY, rows.behind(first));
-    for step in 1..CAUSES.between {
-        let size = low + (high - low) * step as f64 / CAUSES.between as f64;
-        let own = rows.behind(Shape { size, ..first });
-        let model = beside(suspect, &own);
-        let point = minimum(&model, model.at(suspect.x.clone()), f64::INFINITY, task)?;
-        let deviance = model.deviance(&point);
-        if deviance < best.0 {
-            best = (deviance, own);
-        }
-    }
-    Ok(best.1)
-}
 
 /// The causes of a minimum.
 fn causes_of(known: &[Cause], suspect: &Suspect, best: &Minimum<'_>, lead: f64) -> Vec<Cause> {
@@ -230,6 +65,100 @@ fn is_far(causes: &[Cause], rows: &Rows) -> bool {
     })
 }
 
+/// A suspect with its rows, and minima to begin at.
+struct Tried<'s> {
+    suspect: Suspect,
+    rows: Rows,
+    thin: Rows,
+    seeds: &'s [(Class, Numbers)],
+}
+
+impl<'s> Tried<'s> {
+    fn new(suspect: Suspect, rows: Rows, seeds: &'s [(Class, Numbers)]) -> Self {
+        let thin = rows.thinned(STARTS.thin);
+        Self {
+            suspect,
+            rows,
+            thin,
+            seeds,
+        }
+    }
+
+    fn all(tried: Vec<(Suspect, Rows)>, seeds: &'s [(Class, Numbers)]) -> Vec<Self> {
+        let each = tried.into_iter();
+        each.map(|(suspect, rows)| Self::new(suspect, rows, seeds))
+            .collect()
+    }
+}
+
+/// The family with a suspect.
+struct Fitted<'a> {
+    plan: Plan<'a>,
+    minima: Vec<Minimum<'a>>,
+    family: Family,
+}
+
+impl Fitted<'_> {
+    fn bic(&self) -> f64 {
+        let own = self.minima.first().map_or(f64::INFINITY, |one| one.bic);
+        own.min(self.family.least())
+    }
+}
+
+/// What is fitted beside no further cause.
+struct Known<'k, 'p> {
+    plan: &'k Plan<'p>,
+    causes: &'k [Cause],
+    /// The least BIC.
+    linear: f64,
+}
+
+/// Suspects of other sizes, with minima to begin at.
+type Far = Vec<(Suspect, Vec<(Class, Numbers)>)>;
+
+impl<'p> Known<'_, 'p> {
+    /// The families with each of these, without those far from the size that the commands passed, which are
+    /// to be passed anew.
+    fn fitted<'a>(
+        &self,
+        tried: &'a [Tried<'_>],
+        answer: &Answer<'_>,
+        task: &Task,
+    ) -> Result<(Vec<Fitted<'a>>, Far), Error>
+    where
+        'p: 'a,
+    {
+        let (mut out, mut far) = (Vec::new(), Vec::new());
+        for one in tried {
+            let plan = Plan {
+                rows: &one.rows,
+                thin: &one.thin,
+                seeds: one.seeds,
+                grids: false,
+                ..*self.plan
+            };
+            let minima = minima(&plan, task)?;
+            let mut family = answer(&minima)?;
+            if let Some(first) = minima.first() {
+                let lead = self.linear - family.least().min(first.bic);
+                family.causes = causes_of(self.causes, &one.suspect, first, lead);
+                if is_far(&family.causes, first.model.rows) {
+                    let size = family.causes.last().map_or(f64::NAN, |cause| cause.size);
+                    let next = nearer(&one.suspect, first, size);
+                    far.extend(next.map(|suspect| (suspect, seeds_of(&minima))));
+                    continue;
+                }
+            }
+            out.push(Fitted {
+                plan,
+                minima,
+                family,
+            });
+        }
+        Ok((out, far))
+    }
+}
+
 /// The answer with what the plant lacks: a cause that is clearly better is adopted, and then a second one is
 /// looked for; those that the record does not rule out widen the intervals.
 pub(crate) fn with_causes(
@@ -260,40 +189,21 @@ pub(crate) fn with_causes(
     let first = bics.fold(f64::INFINITY, f64::min);
     let most = (linear + CAUSES.hopeful).min(first + EVIDENCE.hopeless);
     tried.retain(|(suspect, _)| suspect.bic < most);
-    let seeds = seeds_of(found);
-    let thinned = tried.iter().map(|(_, rows)| rows.thinned(STARTS.thin));
-    let thin: Vec<Rows> = thinned.collect();
-    let pairs = tried.iter().zip(&thin);
-    let plans: Vec<Plan<'_>> = pairs
-        .map(|((_, rows), thin)| Plan {
-            rows,
-            thin,
-            seeds: &seeds,
-            grids: false,
-            ..*plan
-        })
-        .collect();
-    let (mut fits, mut families, mut kept) = (Vec::new(), Vec::new(), Vec::new());
-    for (plan, (suspect, _)) in plans.iter().zip(&tried) {
-        let fit = minima(plan, task)?;
-        let mut family = answer(&fit)?;
-        if let Some(first) = fit.first() {
-            let lead = linear - family.least().min(first.bic);
-            family.causes = causes_of(&own.causes, suspect, first, lead);
-            if is_far(&family.causes, first.model.rows) {
-                continue;
-            }
-        }
-        families.push(family);
-        fits.push(fit);
-        kept.push(plan);
-    }
-    let bic = |at: usize| {
-        let own = fits[at]
-            .first()
-            .map_or(f64::INFINITY, |one: &Minimum<'_>| one.bic);
-        own.min(families[at].least())
+    let known = Known {
+        plan,
+        causes: &own.causes,
+        linear,
     };
+    let seeds = seeds_of(found);
+    let tried = Tried::all(tried, &seeds);
+    let (mut fits, far) = known.fitted(&tried, answer, task)?;
+    let again = far.iter().map(|(suspect, seeds)| {
+        let rows = with_suspect(&mut suspect.clone(), plan.rows, task)?;
+        Ok(Tried::new(suspect.clone(), rows, seeds))
+    });
+    let again = again.collect::<Result<Vec<_>, Error>>()?;
+    fits.extend(known.fitted(&again, answer, task)?.0);
+    let bic = |at: usize| fits[at].bic();
     let winner = (0..fits.len()).min_by(|a, b| bic(*a).total_cmp(&bic(*b)));
     let goal = linear - CAUSES.adopted.max(CAUSES.beyond * (best.bic - linear));
     let shaken = if known_kinds == 0 {
@@ -307,17 +217,17 @@ pub(crate) fn with_causes(
     let mut adopted = None;
     if shaken.is_none()
         && let Some(at) = winner.filter(|at| bic(*at) < goal)
-        && is_there(&families[at].causes, &fits[at], plan, task)?
+        && is_there(&fits[at].family.causes, &fits[at].minima, plan, task)?
     {
         adopted = Some(at);
     }
     let (mut out, floor) = match adopted {
         Some(at) => {
-            let mut family = families[at].clone();
+            let mut family = fits[at].family.clone();
             if !matters(&own, &family, task)? {
                 family.causes.pop();
             }
-            let deeper = with_causes(family, kept[at], &fits[at], answer, task)?;
+            let deeper = with_causes(family, &fits[at].plan, &fits[at].minima, answer, task)?;
             (deeper, bic(at) + EVIDENCE.reach)
         }
         None => (own.clone(), linear),
@@ -325,7 +235,7 @@ pub(crate) fn with_causes(
     if adopted.is_some_and(|at| best.bic < bic(at) + CAUSES.certain) {
         out.add_within(&own, f64::INFINITY);
     }
-    for (at, family) in families.iter().enumerate() {
+    for (at, Fitted { family, .. }) in fits.iter().enumerate() {
         if Some(at) != adopted {
             out.add_within(family, floor);
             let is_rival = adopted.is_some_and(|own| bic(at) < bic(own) + EVIDENCE.likely);
@@ -445,6 +355,7 @@ fn is_there(
 #[cfg(test)]
 mod tests {
     use super::super::super::rows::{Record, Start};
+    use super::super::super::shape::Shape;
     use super::*;
 
     #[test]

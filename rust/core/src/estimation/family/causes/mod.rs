@@ -16,5 +16,6 @@ mod commands;
 mod jitter;
 mod screen;
 mod smoothed;
+mod suspected;
 
 pub(super) use smoothed::with_smoothing;

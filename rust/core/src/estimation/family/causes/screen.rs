@@ -153,20 +153,38 @@ pub(super) fn frames<'a>(found: &[Minimum<'a>]) -> Vec<Frame<'a>> {
             continue;
         }
         classes.push(class);
-        out.push(Frame::new(one.model, one.point.clone()));
-        if one.model.noise != Noise::White {
-            let white = Model {
-                noise: Noise::White,
-                ..one.model
-            };
-            let x = one.point.x[..one.model.plant_numbers()].to_vec();
-            out.push(Frame::new(white, white.at(x)));
-        }
+        out.extend(frames_of(one));
     }
     if best.model.rows.flexible {
         out.extend(Frame::with_error(best));
     }
     out
+}
+
+/// A plant under its noise and under white noise.
+fn frames_of<'a>(one: &Minimum<'a>) -> impl Iterator<Item = Frame<'a>> {
+    let own = Frame::new(one.model, one.point.clone());
+    let is_coloured = one.model.noise != Noise::White;
+    let white = is_coloured.then(|| {
+        let model = Model {
+            noise: Noise::White,
+            ..one.model
+        };
+        let x = one.point.x[..model.plant_numbers()].to_vec();
+        Frame::new(model, model.at(x))
+    });
+    std::iter::once(own).chain(white)
+}
+
+/// The likeliest plants with one lag that are in no frame: the slope of one lag is limited, and without the limit more
+/// lags may come far nearer.
+fn lagging<'a>(found: &[Minimum<'a>], frames: &[Frame<'a>]) -> Vec<Frame<'a>> {
+    let is_new = |one: &&Minimum<'a>| {
+        let class = one.model.class;
+        class.order == 1 && frames.iter().all(|frame| frame.model.class != class)
+    };
+    let best = found.iter().find(is_new);
+    best.into_iter().flat_map(frames_of).collect()
 }
 
 /// The fall of −2 ln L by a second beginning, far from the first one.
@@ -186,6 +204,7 @@ pub(super) fn suspects(
     task: &Task,
 ) -> Result<Vec<Suspect>, Error> {
     let frames = frames(found);
+    let lagging = lagging(found, &frames);
     let least = found.first().map_or(f64::INFINITY, |best| best.bic);
     let mut out: Vec<Suspect> = Vec::new();
     for kind in CauseKind::ALL {
@@ -196,8 +215,11 @@ pub(super) fn suspects(
         let one = if kind.begins() {
             beginning(kind, rows, &frames, &|_| true)
         } else {
-            let some = lasting(kind, rows, &frames).into_iter();
-            some.min_by(|a, b| a.bic.total_cmp(&b.bic))
+            let mut some = lasting(kind, rows, &frames);
+            if kind.limits_slope() {
+                some.extend(lasting(kind, rows, &lagging));
+            }
+            some.into_iter().min_by(|a, b| a.bic.total_cmp(&b.bic))
         };
         out.extend(one.filter(|one| one.bic < least));
     }
