@@ -16,6 +16,9 @@ type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 
 type Array = Py<PyArray1<f64>>;
 
+/// Kind, size, its error, time, record, lead, and rivals.
+type NamedCause = (&'static str, f64, f64, f64, usize, f64, Vec<&'static str>);
+
 /// One class of plants, fitted.
 #[pyclass(frozen, get_all, module = "deadtime._deadtime")]
 pub(crate) struct FamilyCandidate {
@@ -157,13 +160,15 @@ impl FamilyFit {
         self.core.decided
     }
 
-    /// What the plant lacks: name, size, its standard error, when it began (NaN: all the time), in which
-    /// record, and the BIC by which the records are explained better with it.
+    /// What the plant lacks and is worth a name: name, size, its standard error, when it began (NaN: all the
+    /// time), in which record, the BIC by which the records are explained better with it, and the names of others
+    /// that explain them about as well.
     #[getter]
-    fn causes(&self) -> Vec<(&'static str, f64, f64, f64, usize, f64)> {
-        let causes = self.core.causes.iter();
+    fn causes(&self) -> Vec<NamedCause> {
+        let causes = self.core.causes.iter().filter(|one| one.named);
         causes
             .map(|one| {
+                let rivals = one.rivals.iter().map(|kind| kind.name());
                 (
                     one.kind.name(),
                     one.size,
@@ -171,15 +176,10 @@ impl FamilyFit {
                     one.time,
                     one.record,
                     one.lead,
+                    rivals.collect(),
                 )
             })
             .collect()
-    }
-
-    /// Causes that explain the records about as well as the last one.
-    #[getter]
-    fn rival_causes(&self) -> Vec<&'static str> {
-        self.core.rivals.iter().map(|kind| kind.name()).collect()
     }
 
     /// Rows that are no readings of the sensor: why, in which record, how many, from and to which time, and

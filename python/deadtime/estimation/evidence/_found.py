@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import deadtime.estimation._native as native
 from deadtime._base.digits import shown, time_unit
@@ -269,17 +269,15 @@ class SensorFault:
 
 
 def causes_of(found: native.FamilyFit) -> tuple[Cause, ...]:
-    """The causes in the answer of the kernel; only the last one has others beside it."""
+    """The causes in the answer of the kernel."""
     named = []
-    for kind, size, error, time, _, lead in found.causes:
+    for kind, size, error, time, _, lead, rivals in found.causes:
         reach = REACH * error if math.isfinite(error) else math.inf
         ends = (size - reach, size + reach)
         began = None if math.isnan(time) else time
-        named.append(Cause(NAMES.get(kind, kind), size, ends, began, lead, (), kind))
-    if named and found.rival_causes:
-        others = dict.fromkeys(NAMES.get(kind, kind) for kind in found.rival_causes)
-        others.pop(named[-1].name, None)
-        named[-1] = replace(named[-1], others=tuple(others))
+        others = dict.fromkeys(NAMES.get(rival, rival) for rival in rivals)
+        others.pop(name := NAMES.get(kind, kind), None)
+        named.append(Cause(name, size, ends, began, lead, tuple(others), kind))
     return tuple(named)
 
 

@@ -1,7 +1,7 @@
 //! The answer of the family to records: its verdict, its plants and their intervals.
 
 use super::candidate::Candidate;
-use super::cause::{Cause, CauseKind};
+use super::cause::Cause;
 use super::class::{Class, Numbers};
 use super::hull::{Named, Triple, at, hull, mean_delay, turning};
 use super::sensors::SensorFault;
@@ -34,8 +34,6 @@ pub struct Family {
     pub excited: Vec<f64>,
     /// What the plant lacks, as far as the record shows it clearly.
     pub causes: Vec<Cause>,
-    /// Causes that explain the record about as well as the last of these.
-    pub rivals: Vec<CauseKind>,
     /// Rows that are no readings of the sensor.
     pub sensor: Vec<SensorFault>,
     /// The largest delay that may be, that was tried in the end, and one over the noise of each record.

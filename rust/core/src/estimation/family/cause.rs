@@ -111,7 +111,7 @@ impl CauseKind {
 }
 
 /// A cause that was found.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
     /// Its kind.
     pub kind: CauseKind,
@@ -125,4 +125,8 @@ pub struct Cause {
     pub record: usize,
     /// BIC by which the record is explained better with it.
     pub lead: f64,
+    /// Is it worth a name?
+    pub named: bool,
+    /// Others that explain the records about as well.
+    pub rivals: Vec<CauseKind>,
 }

@@ -497,7 +497,6 @@ fn answer(
         shift: 0,
         excited,
         causes: Vec::new(),
-        rivals: Vec::new(),
         sensor: Vec::new(),
         largest_delay,
         delay_limit: largest_delay,

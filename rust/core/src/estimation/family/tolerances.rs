@@ -254,8 +254,10 @@ pub(super) struct Causes {
     /// Factor of a size within which a change of it is taken to first order: more takes what is far from the commands
     /// that were passed.
     pub(super) factor: f64,
-    /// BIC by which a cause has to lead: less names what is not there.
+    /// BIC by which a cause has to lead: less takes what is not there for one.
     pub(super) adopted: f64,
+    /// The same for its name: less gives a drift of the sensor, or one cause, the name of another.
+    pub(super) named: f64,
     /// BIC by which it leads where the plant without it is ruled out: more widens intervals.
     pub(super) certain: f64,
     /// The same for a further one, as a share of the lead of the first: less takes for a second cause what
@@ -296,6 +298,7 @@ pub(super) const CAUSES: Causes = Causes {
     settled: 0.002,
     factor: 2.0,
     adopted: 6.0,
+    named: 20.0,
     certain: 40.0,
     further: 0.04,
     beyond: 1.25,

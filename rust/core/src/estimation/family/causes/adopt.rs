@@ -31,6 +31,8 @@ fn causes_of(known: &[Cause], suspect: &Suspect, best: &Minimum<'_>, lead: f64) 
         time: suspect.time,
         record: suspect.record,
         lead,
+        named: lead >= CAUSES.named,
+        rivals: Vec::new(),
     });
     let (count, mut end) = (out.len(), 0);
     for (at, cause) in out.iter_mut().enumerate() {
@@ -224,8 +226,9 @@ pub(crate) fn with_causes(
     let (mut out, floor) = match adopted {
         Some(at) => {
             let mut family = fits[at].family.clone();
-            if !matters(&own, &family, task)? {
-                family.causes.pop();
+            let named = matters(&own, &family, task)?;
+            if let Some(cause) = family.causes.last_mut() {
+                cause.named &= named;
             }
             let deeper = with_causes(family, &fits[at].plan, &fits[at].minima, answer, task)?;
             (deeper, bic(at) + EVIDENCE.reach)
@@ -240,7 +243,9 @@ pub(crate) fn with_causes(
             out.add_within(family, floor);
             let is_rival = adopted.is_some_and(|own| bic(at) < bic(own) + EVIDENCE.likely);
             let last = family.causes.last().filter(|_| is_rival);
-            out.rivals.extend(last.map(|cause| cause.kind));
+            if let Some(adopted) = out.causes.get_mut(own.causes.len()) {
+                adopted.rivals.extend(last.map(|cause| cause.kind));
+            }
         }
     }
     out.causes.extend(shaken.map(|(cause, _)| cause));
@@ -381,6 +386,8 @@ mod tests {
             time: f64::NAN,
             record: 0,
             lead: 80.0,
+            named: true,
+            rivals: Vec::new(),
         };
         assert!(!is_far(&[of(1.2)], &rows));
         assert!(!is_far(&[of(1.0)], &rows));

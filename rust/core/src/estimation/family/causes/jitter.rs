@@ -8,7 +8,7 @@ use super::super::information::products;
 use super::super::minima::Minimum;
 use super::super::random::likeliest;
 use super::super::response::pulse;
-use super::super::tolerances::JITTER;
+use super::super::tolerances::{CAUSES, JITTER};
 use super::screen::{Frame, frames};
 use crate::elementary::log;
 use crate::linear_algebra::vectors::dot;
@@ -52,6 +52,8 @@ fn beside(frame: &Frame<'_>, least: f64) -> Option<(Cause, f64)> {
         time: f64::NAN,
         record: 0,
         lead: least - bic,
+        named: least - bic >= CAUSES.named,
+        rivals: Vec::new(),
     };
     Some((cause, bic))
 }
