@@ -12,6 +12,7 @@ sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
 
 from strangers.estimates import estimates
 from strangers.rows import chosen
+from strangers.sizes import size_of
 
 ROW = 0.05
 VEHICLE = dtm.ControlLoop(
@@ -99,3 +100,12 @@ def test_a_limit_of_the_slope_is_found_though_other_plants_come_near(seed, run):
     assert all(
         high - low < 0.5 * one.values[quantity] for quantity, (low, high) in one.ends.items()
     )
+
+
+def test_a_drift_of_the_sensor_is_seldom_a_cause():
+    """A random walk may look like a step; a smaller lead than 20 gave names to half of these."""
+    (row,) = chosen(["open steps: drift large"])
+    size = size_of(row.kind, row.fault, row.size)["size"]
+    found = estimates(row, size, 7, range(10))
+    assert all(one.verdict == "reliable" for one in found)
+    assert sum(bool(one.causes) for one in found) <= 2
