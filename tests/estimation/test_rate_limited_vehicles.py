@@ -106,7 +106,14 @@ def behind_limits(seed):
     return fit.verdict == "reliable", np.concatenate(found)
 
 
-@pytest.mark.parametrize("flights", [2, pytest.param(40, marks=pytest.mark.survey)])
+@pytest.mark.parametrize(
+    "flights",
+    [
+        2,
+        pytest.param(10, marks=pytest.mark.survey),
+        pytest.param(40, marks=[pytest.mark.survey, pytest.mark.long]),
+    ],
+)
 def test_behind_given_limits_no_plant_has_to_be_named(flights):
     found = [behind_limits(seed) for seed in range(300, 300 + flights)]
     reliable = [one for one, _ in found]
