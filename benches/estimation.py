@@ -49,7 +49,8 @@ those of fits that know the noise, without faults (`strangers.oracle`).
 
 Run ``python benches/estimation.py --gains [--runs N] [--seed S] [--quick]`` to propose gains from
 500 bump tests, PI loops and height steps in wind with small faults, and to print stability and
-largest sensitivity of the true loops (`strangers.gains`).
+largest sensitivity of the true loops (`strangers.gains`). With ``--margins`` P, PI and PV have a
+demanded gain margin, from 2000 records of all plants with small faults (`strangers.margins`).
 
 The other tables are in folders of their own; the first ones are one file, because cases, methods
 and what each method is given are read together, and the command line that chooses between all.
@@ -82,6 +83,7 @@ from reality.oracle_table import print_oracle
 from reality.table import chosen, free_of, print_table
 from strangers import rows as strangers
 from strangers.gains import print_gains
+from strangers.margins import print_margins
 from strangers.oracle import print_strangers_oracle
 from strangers.table import print_strangers
 
@@ -516,6 +518,7 @@ def main() -> None:
     strange = parser.add_argument_group("plants and faults that the estimator does not know")
     strange.add_argument("--strangers", action="store_true", help="print their table alone")
     strange.add_argument("--gains", action="store_true", help="print gains proposed from some")
+    strange.add_argument("--margins", action="store_true", help="print the margins of designs")
     flown = parser.add_argument_group("flights against ArduPilot's Copter")
     flown.add_argument("--firmware", action="store_true", help="fly, and print their table alone")
     flown.add_argument(
@@ -550,6 +553,9 @@ def main() -> None:
         return
     if given.gains:
         print_gains(given.runs or (2 if given.quick else 500), given.seed or 0, given.processes)
+        return
+    if given.margins:
+        print_margins(given.runs or (20 if given.quick else 2000), given.seed or 0, given.processes)
         return
     if given.strangers:
         try:

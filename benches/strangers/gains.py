@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import deadtime as dtm
 import numpy as np
+from deadtime.loops import Controller
 from reality.table import pool_of
 
 from strangers.estimates import known, recording_of
@@ -69,8 +70,10 @@ class Proposed:
     seconds: float
 
 
-def sensitivity(plant: Linear, controller: dtm.P | dtm.PI) -> float:
+def sensitivity(plant: Linear, controller: Controller, factor: float = 1.0) -> float:
     """Ms of a loop with one of the plants; infinite where it is unstable (Nyquist).
+
+    `factor` multiplies the gains.
 
     The plant has no poles to the right. So 1 + L turns by a quarter turn for each pole at zero, or
     the loop has poles to the right.
@@ -78,9 +81,9 @@ def sensitivity(plant: Linear, controller: dtm.P | dtm.PI) -> float:
     w = 10.0 ** np.linspace(-DECADES, DECADES, PLACES)[None, :] / plant._time[:, None]
     size, angle = plant.response(w)
     s = 1j * w[0]
-    Ki = getattr(controller, "Ki", 0.0)
+    Kp, Ki, Kv = (getattr(controller, name, 0.0) for name in ("Kp", "Ki", "Kv"))
     poles = plant.integrators + (Ki != 0.0)
-    C = controller.Kp + Ki / s
+    C = factor * (Kp + Ki / s + Kv * s)
     G = np.sign(plant.gain) * np.exp(size[0] + 1j * angle[0]) / 1j**plant.integrators
     difference = 1.0 + C * G
     turned = float(np.unwrap(np.angle(difference))[[0, -1]] @ [-1.0, 1.0])

@@ -19,7 +19,9 @@ sys.path.append(str(BENCHES))
 from strangers import sizes, table, truth  # noqa: E402
 from strangers.estimates import estimates, numbers  # noqa: E402
 from strangers.faults import FAULTS, named_size  # noqa: E402
+from strangers.gains import sensitivity  # noqa: E402
 from strangers.least_squares import data_of, fitted, standard_errors  # noqa: E402
+from strangers.margins import DEMANDED, margin_met  # noqa: E402
 from strangers.plants import KINDS, drawn  # noqa: E402
 from strangers.rows import chosen, lot, rows  # noqa: E402
 from strangers.simulate import logged, mean  # noqa: E402
@@ -45,7 +47,7 @@ def test_the_generator_does_not_use_the_package():
         tree = ast.parse(path.read_text(encoding="utf-8"))
         used = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
         used += [one.name for n in ast.walk(tree) if isinstance(n, ast.Import) for one in n.names]
-        asks = path.stem in ("estimates", "gains")
+        asks = path.stem in ("estimates", "gains", "margins")
         assert asks or not any(each.startswith("deadtime") for each in used)
 
 
@@ -100,6 +102,23 @@ def test_what_a_loop_feels_is_that_of_the_exact_margin(kind):
         half = loop.replace(controller=dtm.P(0.5 * math.exp(largest[i])))
         below = [w for w in half.margin().gain_crossovers if w < turn[i]]
         assert omega[i] == pytest.approx(max(below, default=0.5 * turn[i]), rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", [name for name in KINDS if name != "height limits"])
+def test_margins_of_true_loops_are_the_exact_ones(kind):
+    linear = some(kind, 1).linear
+    sharp, time = math.exp(linear.turns()[1][0]), float(linear.delay[0])
+    plant = exact_plant(linear, 0)
+    for share in (0.39, 0.41, 1.1):
+        Kp = share * sharp
+        for controller in (dtm.P(Kp), dtm.PI(Kp, 0.1 * Kp / time), dtm.PV(Kp, 0.1 * Kp * time)):
+            loop = dtm.ControlLoop(plant, controller, delay=time)
+            stable = loop.is_stable()
+            met = stable and loop.margin().gain_margin >= DEMANDED
+            assert margin_met(linear, controller) == (stable, met)
+            if stable:
+                most = loop.margin().max_sensitivity
+                assert 1.0 / sensitivity(linear, controller) == pytest.approx(1.0 / most, abs=1e-3)
 
 
 @pytest.mark.parametrize("kind", KINDS)
