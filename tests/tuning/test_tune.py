@@ -50,6 +50,13 @@ def test_the_true_sensitivity_is_below_the_largest_of_the_possible_plants(found)
     assert most < found.margins.max_sensitivity < 1.61
 
 
+def test_an_objective_of_one_loop_refuses_several_plants_and_says_what_to_give(found):
+    with pytest.raises(ValueError, match=r"'abscissa'.*PlantEstimate.*'load'.*loop\(controller\)"):
+        dtm.design(found.fit, controller=dtm.PI, objective="abscissa")
+    likeliest = found.fit.loop(dtm.PI(1.0, 0.01))
+    assert dtm.design(likeliest, objective="abscissa").abscissa < 0.0
+
+
 @pytest.mark.survey
 def test_the_settling_time_is_near_the_best_of_all_pi_controllers(found):
     truth = Process(1.8, 40.0, LATE)

@@ -185,8 +185,17 @@ def design(
         raise ValueError(f"filter={filter!r}: give a DerivativeFilter, 'auto' or None")
     required = RequiredMargins.checked(gain_margin, phase_margin, delay_margin)
     demands = Demands.checked(required, max_sensitivity, noise_gain, settling_time, bandwidth)
+    names = get_args(ObjectiveName)
+    if objective not in names:
+        raise ValueError(f"objective={objective!r}: give one of {', '.join(map(repr, names))}")
     doubt = None
-    if isinstance(loop, PlantEstimate) and objective in RESPONSES:
+    if isinstance(loop, PlantEstimate):
+        if objective not in RESPONSES:
+            raise ValueError(
+                f"objective={objective!r} cannot be used with a PlantEstimate: give one of the "
+                f"objectives {', '.join(map(repr, RESPONSES))}, or the likeliest loop alone, "
+                "estimate.loop(controller)"
+            )
         doubt = refusal(loop)
         if doubt is not None and not allow_indication:
             raise ValueError(
@@ -211,9 +220,6 @@ def design(
         others = _loops_of(plants, template)
         wanted = Wanted(problem, objective, weight, demands, others, doubt, slack)
         return wanted.design()
-    names = get_args(ObjectiveName)
-    if objective not in names:
-        raise ValueError(f"objective={objective!r}: give one of {', '.join(map(repr, names))}")
     goal = objective_named(objective)
     only = {"load_weight": load_weight, "load_slack": load_slack, "bandwidth": bandwidth}
     _refuse_responses(objective, demands, only, plants)
