@@ -220,6 +220,7 @@ def spoilt(**rows: Any) -> dtm.Recording:
         ("frozen", [(150, 190)], 39),
         ("glitch", [(60, 63), (140, 141), (300, 304)], 8),
         ("repeated", range(3, 460, 4), 115),
+        ("repeated", (100, 240, 310), 3),
     ],
 )
 def test_what_a_sensor_did_not_read_is_left_out(name: str, rows: Any, left_out: int) -> None:
@@ -229,6 +230,13 @@ def test_what_a_sensor_did_not_read_is_left_out(name: str, rows: Any, left_out: 
     assert 0.95 * left_out <= fault.rows <= left_out
     assert f"left out: {fault.in_words()}" in fit.summary()
     check_the_linear_part(fit)
+
+
+def test_equal_readings_of_a_fine_sensor_are_rounded_ones() -> None:
+    clean = flown()
+    output = np.round(spoilt(repeated=(100, 240, 310)).output / 1e-4) * 1e-4
+    fit = dtm.estimate_delay(dtm.Recording(clean.time, clean.reference, output, clean.command))
+    assert fit.sensor_faults == ()
 
 
 @pytest.mark.parametrize("rows", [3, 5, 9])

@@ -162,10 +162,11 @@ fn repeats(values: &[f64]) -> Vec<Range<usize>> {
     }
     let count = steps.len() as f64;
     // As often as a reading moves by one step up or down, it stays where it is.
-    let single = moved.iter().filter(|step| **step < 1.5 * least).count() as f64;
+    let single = moved.partition_point(|step| *step < 1.5 * least);
     let equal = (steps.len() - moved.len()) as f64;
-    let chance = 0.5 * single.max(2.0);
-    let longest = if equal > SENSORS.excess * chance + SENSORS.few {
+    let chance = 0.5 * single.max(2) as f64;
+    let is_chance = equal < single as f64 || are_rounded(&moved);
+    let longest = if !is_chance || equal > SENSORS.excess * chance + SENSORS.few {
         1.0
     } else {
         (count / SENSORS.chance).ln() / (count / chance).ln()
@@ -188,6 +189,30 @@ fn repeats(values: &[f64]) -> Vec<Range<usize>> {
         at += 1;
     }
     out
+}
+
+/// Whether the smallest of these moves, in order, are by whole steps of a sensor. Readings that are not rounded are
+/// equal by no chance.
+fn are_rounded(moved: &[f64]) -> bool {
+    let Some((least, others)) = moved.split_first() else {
+        return true;
+    };
+    let others = &others[..others.len().min(SENSORS.moves)];
+    // The least move may be by several steps.
+    let by_whole = |parts: usize| {
+        let (mut sum, mut count, mut whole) = (*least, parts as f64, 0);
+        for own in others {
+            // The step is known better from larger moves.
+            let steps = own * count / sum;
+            if (steps - steps.round()).abs() < SENSORS.off {
+                whole += 1;
+                sum += own;
+                count += steps.round();
+            }
+        }
+        f64::from(whole) >= SENSORS.whole * others.len() as f64
+    };
+    others.len() < SENSORS.enough || (1..=SENSORS.parts).any(by_whole)
 }
 
 /// Readings that leave for a few rows and come back, both by far more than those around them move.
@@ -328,5 +353,17 @@ mod tests {
             (SensorKind::Repeated, 133)
         );
         assert_eq!(faults[0].record, 1);
+    }
+
+    #[test]
+    fn one_equal_reading_is_a_repeat_where_readings_are_not_rounded() {
+        for (step, rows) in [(0.0, 3), (1e-4, 0), (1e-3, 0)] {
+            let mut output = noisy(400, step);
+            for at in [57, 180, 333] {
+                output[at] = output[at - 1];
+            }
+            let (_, faults) = without_faults(&of(output), 0);
+            assert_eq!(faults.iter().map(|fault| fault.rows).sum::<usize>(), rows);
+        }
     }
 }

@@ -375,6 +375,15 @@ pub(super) struct Sensors {
     /// Equal readings in multiples of those by chance, and beyond them, from which on all are repeats.
     pub(super) excess: f64,
     pub(super) few: f64,
+    /// How many of the smallest moves show whether readings are rounded, fewest of them, and most steps of the
+    /// sensor in the least move: more takes moves for whole steps that are none.
+    pub(super) moves: usize,
+    pub(super) enough: usize,
+    pub(super) parts: usize,
+    /// Distance from a whole step up to which a move is one, and the share of these from which on readings are
+    /// rounded: less of the first, or more of the second, takes equal rounded readings for repeats.
+    pub(super) off: f64,
+    pub(super) whole: f64,
     /// Runs of equal readings by chance in a record, above which they are repeats.
     pub(super) chance: f64,
     /// Rows, and multiples of the usual repeat, from which on a reading is frozen.
@@ -394,6 +403,11 @@ pub(super) const SENSORS: Sensors = Sensors {
     coarse: 3.0,
     excess: 3.0,
     few: 10.0,
+    moves: 24,
+    enough: 8,
+    parts: 8,
+    off: 0.1,
+    whole: 0.7,
     chance: 1e-3,
     frozen: 6.0,
     longer: 4.0,
