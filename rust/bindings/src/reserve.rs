@@ -9,7 +9,9 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::ptr::null_mut;
-use std::sync::atomic::{AtomicPtr, Ordering};
+use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};
+use std::thread::sleep;
+use std::time::Duration;
 
 use deadtime::Error;
 use deadtime::memory::{HEADROOM, end_shortage, out_of_memory, report_shortage};
@@ -17,7 +19,13 @@ use deadtime::memory::{HEADROOM, end_shortage, out_of_memory, report_shortage};
 #[global_allocator]
 static ALLOCATOR: Reserve = Reserve {
     kept: AtomicPtr::new(null_mut()),
+    freeing: AtomicUsize::new(0),
 };
+
+/// How often, and for how long, a thread waits for another one that frees the reserve: a second at most, because a
+/// process that was forked meanwhile has no such thread.
+const TURNS: usize = 10_000;
+const TURN: Duration = Duration::from_micros(100);
 
 /// The memory in reserve.
 const KEPT: Layout = match Layout::from_size_align(HEADROOM, 16) {
@@ -29,6 +37,8 @@ const KEPT: Layout = match Layout::from_size_align(HEADROOM, 16) {
 struct Reserve {
     /// Null where the reserve is in use.
     kept: AtomicPtr<u8>,
+    /// Threads that are freeing it.
+    freeing: AtomicUsize,
 }
 
 /// Have memory in reserve before work begins.
@@ -68,12 +78,20 @@ impl Reserve {
             return false;
         }
         report_shortage();
+        self.freeing.fetch_add(1, Ordering::AcqRel);
         let memory = self.kept.swap(null_mut(), Ordering::AcqRel);
         if !memory.is_null() {
             // SAFETY: it is from `fill`, and nobody else has it.
             unsafe { System.dealloc(memory, KEPT) };
         }
-        // Another thread may have freed it just now.
+        self.freeing.fetch_sub(1, Ordering::AcqRel);
+        // Another thread may have it, and not have freed it yet.
+        for _ in 0..TURNS {
+            if self.freeing.load(Ordering::Acquire) == 0 {
+                break;
+            }
+            sleep(TURN);
+        }
         true
     }
 }
