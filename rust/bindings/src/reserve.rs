@@ -9,7 +9,7 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::ptr::null_mut;
-use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicPtr, Ordering};
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -19,12 +19,10 @@ use deadtime::memory::{HEADROOM, end_shortage, out_of_memory, report_shortage};
 #[global_allocator]
 static ALLOCATOR: Reserve = Reserve {
     kept: AtomicPtr::new(null_mut()),
-    freeing: AtomicUsize::new(0),
 };
 
-/// How often, and for how long, a thread waits for another one that frees the reserve: a second at most, because a
-/// process that was forked meanwhile has no such thread.
-const TURNS: usize = 10_000;
+/// How often a request is tried again, and how long after: for a fraction of a second.
+const TURNS: usize = 2000;
 const TURN: Duration = Duration::from_micros(100);
 
 /// The memory in reserve.
@@ -37,8 +35,6 @@ const KEPT: Layout = match Layout::from_size_align(HEADROOM, 16) {
 struct Reserve {
     /// Null where the reserve is in use.
     kept: AtomicPtr<u8>,
-    /// Threads that are freeing it.
-    freeing: AtomicUsize,
 }
 
 /// Have memory in reserve before work begins.
@@ -71,28 +67,28 @@ impl Reserve {
         Ok(())
     }
 
-    /// Free the reserve for a request of so many bytes; false for one that it does not serve.
+    /// Free the reserve for a request of so many bytes, and try it again; null for one that it does not serve.
     #[cold]
-    fn give(&self, bytes: usize) -> bool {
+    fn again(&self, bytes: usize, allocate: impl Fn() -> *mut u8) -> *mut u8 {
         if bytes >= KEPT.size() {
-            return false;
+            return null_mut();
         }
         report_shortage();
-        self.freeing.fetch_add(1, Ordering::AcqRel);
         let memory = self.kept.swap(null_mut(), Ordering::AcqRel);
         if !memory.is_null() {
             // SAFETY: it is from `fill`, and nobody else has it.
             unsafe { System.dealloc(memory, KEPT) };
         }
-        self.freeing.fetch_sub(1, Ordering::AcqRel);
-        // Another thread may have it, and not have freed it yet.
+        // Another thread may be about to free the reserve. Or it asks how much memory there is, which takes all for a
+        // moment.
         for _ in 0..TURNS {
-            if self.freeing.load(Ordering::Acquire) == 0 {
-                break;
+            let made = allocate();
+            if !made.is_null() {
+                return made;
             }
             sleep(TURN);
         }
-        true
+        null_mut()
     }
 }
 
@@ -101,24 +97,24 @@ impl Reserve {
 unsafe impl GlobalAlloc for Reserve {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let made = unsafe { System.alloc(layout) };
-        if made.is_null() && self.give(layout.size()) {
-            return unsafe { System.alloc(layout) };
+        if made.is_null() {
+            return self.again(layout.size(), || unsafe { System.alloc(layout) });
         }
         made
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         let made = unsafe { System.alloc_zeroed(layout) };
-        if made.is_null() && self.give(layout.size()) {
-            return unsafe { System.alloc_zeroed(layout) };
+        if made.is_null() {
+            return self.again(layout.size(), || unsafe { System.alloc_zeroed(layout) });
         }
         made
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         let made = unsafe { System.realloc(memory, layout, size) };
-        if made.is_null() && self.give(size) {
-            return unsafe { System.realloc(memory, layout, size) };
+        if made.is_null() {
+            return self.again(size, || unsafe { System.realloc(memory, layout, size) });
         }
         made
     }
