@@ -12,7 +12,10 @@ import math
 import os
 import time
 import warnings
+from collections.abc import Callable, Iterable
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass
+from typing import TypeVar
 
 import deadtime as dtm
 import numpy as np
@@ -48,6 +51,8 @@ PLACES, DECADES = 40_000, 4.0
 
 #: Records that a process makes at once.
 BATCH = 10
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -156,6 +161,21 @@ def line(kind: str, found: list[Proposed]) -> str:
     ).rstrip()
 
 
+def batches(
+    pool: Executor,
+    work: Callable[[str, int, range], list[T]],
+    kinds: Iterable[str],
+    seed: int,
+    runs: int,
+) -> dict[str, list[Future[list[T]]]]:
+    """Work on so many records of each kind, `BATCH` of them at once, in the processes of a pool."""
+    starts = range(0, runs, BATCH)
+    return {
+        kind: [pool.submit(work, kind, seed, range(i, min(i + BATCH, runs))) for i in starts]
+        for kind in kinds
+    }
+
+
 def print_gains(runs: int, seed: int, processes: int) -> None:
     """Propose gains from so many records of each kind, and print how the true loops do."""
     os.environ.setdefault("RAYON_NUM_THREADS", "1")  # the processes are enough
@@ -166,13 +186,7 @@ def print_gains(runs: int, seed: int, processes: int) -> None:
     begin = time.perf_counter()
     pool = pool_of(processes)
     try:
-        waiting = {
-            kind: [
-                pool.submit(proposed, kind, seed, range(i, min(i + BATCH, runs)))
-                for i in range(0, runs, BATCH)
-            ]
-            for kind in PROPOSED
-        }
+        waiting = batches(pool, proposed, PROPOSED, seed, runs)
         for kind, parts in waiting.items():
             print(line(kind, [one for part in parts for one in part.result()]), flush=True)
     finally:

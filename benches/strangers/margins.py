@@ -21,7 +21,7 @@ from reality.table import pool_of
 
 from strangers.estimates import known, recording_of
 from strangers.faults import Fault, nothing
-from strangers.gains import sensitivity
+from strangers.gains import batches, sensitivity
 from strangers.linear import Linear
 from strangers.plants import KINDS, drawn, random_of
 from strangers.rows import lot
@@ -37,9 +37,6 @@ FACTORS = np.linspace(1.0, DEMANDED * (1.0 - 1e-9), 4)
 
 #: PI and PV are designed for one of so many records, PV of plants that integrate.
 EACH = {"PI": 10, "PV": 5}
-
-#: Records that a process makes at once.
-BATCH = 10
 
 #: The row of all plants together.
 ALL = "all plants"
@@ -122,13 +119,7 @@ def print_margins(runs: int, seed: int, processes: int) -> None:
     each = max(1, runs // len(KINDS))
     pool = pool_of(processes)
     try:
-        waiting = {
-            kind: [
-                pool.submit(tried, kind, seed, range(i, min(i + BATCH, each)))
-                for i in range(0, each, BATCH)
-            ]
-            for kind in KINDS
-        }
+        waiting = batches(pool, tried, KINDS, seed, each)
         found = {
             kind: [one for part in parts for one in part.result()]
             for kind, parts in waiting.items()
